@@ -1,0 +1,54 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+
+/// Every parameter of training and detection with its default, its unit and its range. A default is written here only.
+namespace binpose {
+
+/// How vector pairs are ranked before the best are kept.
+enum class PairSelection {
+  kDistinctiveness,  ///< 1 - Ph [Eq. 4]: rare features first
+  kObservability,    ///< Obs [Eq. 6]: pairs seen from many viewpoints first
+  kIntegration,      ///< w1 Obs + w2 (1 - Ph) [Eq. 7]
+  kSignalToNoise,    ///< Obs / sqrt(Ph): expected true votes over the noise of the false ones
+};
+
+/// Lengths |P Q1| and |P Q2| of the two vectors of a pair, as shares of the diameter.
+struct PairLengths {
+  double relative_q1 = 0.30;
+  double relative_q2 = 0.22;
+};
+
+/// How a mesh becomes a model. `relative_*`: share of the part's diameter.
+struct TrainParams {
+  double relative_sampling = 0.045;                                      ///< spacing of the pair points, [0.02, 0.1]
+  std::vector<PairLengths> pair_lengths = {{0.30, 0.22}, {0.22, 0.12}};  ///< 1 to 4 of them
+  double relative_length_tolerance = 0.02;                               ///< (0, 0.05]
+  double bin_width = 0.20943951023931953;  ///< of a feature angle, radians (12 deg), [4, 45] deg
+  int viewpoint_count = 500;               ///< K of [Eq. 5, 6], [16, 4096]
+  PairSelection selection = PairSelection::kSignalToNoise;
+  double pairs_per_point = 3.0;         ///< N as a multiple of the model points, (0, 20]
+  double observability_weight = 1.0;    ///< w1 of [Eq. 7], [0, 1000]
+  double distinctiveness_weight = 1.0;  ///< w2 of [Eq. 7], [0, 1000]
+
+  /// The paper's settings: one pair of lengths, N = 10 % of the model points, 1:1 integration.
+  static TrainParams paper();
+};
+
+/// How a cloud is searched.
+struct DetectParams {
+  double min_score = 0.4;                         ///< [0, 1]
+  int max_results = 100;                          ///< [1, 1000]
+  double start_point_share = 0.2;                 ///< share of the down-sampled points that pairs start from, (0, 1]
+  double normal_tolerance = 0.17453292519943295;  ///< gate on pair normals, radians (10 deg), [2, 45] deg
+  bool remove_support_plane = true;
+};
+
+/// OK, or INVALID_ARGUMENT with a sentence that names field, value and range.
+absl::Status validate(const TrainParams& params);
+absl::Status validate(const DetectParams& params);
+
+}  // namespace binpose
