@@ -1,0 +1,43 @@
+#!/bin/sh
+# Installs the Debian 12 packages that are missing, and nothing when none is. The one list of what binpose needs.
+# Usage: install-packages.sh build|test
+set -eu
+
+packages="cmake g++ ninja-build
+  libabsl-dev libassimp-dev libcli11-dev libeigen3-dev libgrpc++-dev libprotobuf-dev libspdlog-dev libtbb-dev
+  prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
+case "${1:-}" in
+  build) ;;
+  test)
+    packages="$packages clang-format clang-tidy libgmock-dev libgtest-dev python3"
+    # Node.js from elsewhere brings its own npm and conflicts with Debian's.
+    command -v npm >/dev/null || packages="$packages npm ca-certificates"
+    ;;
+  *)
+    echo "Usage: $0 build|test" >&2
+    exit 2
+    ;;
+esac
+
+missing=""
+for package in $packages; do
+  dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
+done
+[ -n "$missing" ] || exit 0
+
+sudo=""
+if [ "$(id -u)" != 0 ]; then
+  command -v sudo >/dev/null || { echo "Missing:$missing. Install them as root, or install sudo." >&2; exit 1; }
+  sudo="sudo"
+fi
+
+echo "Installing$missing"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+# shellcheck disable=SC2086  # words on purpose
+if ! { $sudo apt-get update && $sudo env DEBIAN_FRONTEND=noninteractive \
+       apt-get install -y --no-install-recommends $missing; } >"$log" 2>&1; then
+  cat "$log" >&2
+  echo "apt-get could not install:$missing" >&2
+  exit 1
+fi

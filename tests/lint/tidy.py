@@ -1,0 +1,76 @@
+"""clang-tidy over every source of the project in a build's compile_commands.json.
+
+A file that passed is not read again until it, a header of ours that it includes, its compile command or .clang-tidy
+changes; the stamps lie in the build directory.
+
+Usage: tidy.py BUILD_DIR
+"""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def includes_of(build):
+    """Object file -> the project's own files that went into it, from Ninja's log of dependencies."""
+    log = subprocess.run(["ninja", "-C", build, "-t", "deps"], capture_output=True, text=True, check=True).stdout
+    files, current = {}, None
+    for line in log.splitlines():
+        if line.startswith("    "):
+            path = (build / line.strip()).resolve()
+            if path.is_relative_to(ROOT):
+                files[current].append(path)
+        elif ": #deps" in line:
+            current = line.split(": #deps")[0]
+            files[current] = []
+    return files
+
+
+def object_of(entry):
+    return entry["command"].split(" -o ")[1].split()[0]
+
+
+def fingerprint(entry, files):
+    digest = hashlib.sha256(entry["command"].encode())
+    for file in [ROOT / ".clang-tidy", Path(entry["file"]), *sorted(files)]:
+        digest.update(file.read_bytes() if file.exists() else b"")
+    return digest.hexdigest()
+
+
+def tidy(build, entry, files):
+    """What clang-tidy found in one file; empty if it is clean."""
+    name = str(Path(entry["file"]).relative_to(ROOT))
+    stamp = build / "tidy" / (name.replace("/", ".") + ".passed")
+    now = fingerprint(entry, files)
+    if stamp.exists() and stamp.read_text() == now:
+        return ""
+    run = subprocess.run(["clang-tidy", "--quiet", "-p", build, entry["file"]], capture_output=True, text=True)
+    if run.returncode == 0:
+        stamp.write_text(now)
+        return ""
+    return f"== {name}\n{run.stdout}{run.stderr if not run.stdout else ''}"
+
+
+def main():
+    build = Path(sys.argv[1]).resolve()
+    (build / "tidy").mkdir(exist_ok=True)
+    includes = includes_of(build)
+    entries = [entry for entry in json.loads((build / "compile_commands.json").read_text())
+               if Path(entry["file"]).is_relative_to(ROOT) and not Path(entry["file"]).is_relative_to(build)]
+    if not entries:
+        sys.exit(f"{build}/compile_commands.json names no source of this project.")
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        findings = list(pool.map(lambda entry: tidy(build, entry, includes.get(object_of(entry), [])), entries))
+    print("".join(findings), end="")
+    print(f"clang-tidy: {sum(map(bool, findings))} of {len(entries)} files have findings.")
+    sys.exit(any(findings))
+
+
+if __name__ == "__main__":
+    main()

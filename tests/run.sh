@@ -1,0 +1,20 @@
+#!/bin/sh
+# Installs what is missing, builds, and runs every test and lint; what stands from an earlier run is kept.
+# Usage: run.sh [ctest options], for example: run.sh -R Detect
+set -eu
+cd "$(dirname "$0")/.."
+build=build/dev
+
+deploy/install-packages.sh test
+
+cmake --preset dev
+cmake --build "$build"
+
+# The linter of the wire API is an npm package; without a network its test is skipped and says so.
+if ! cmp -s tests/lint/package.json "$build/package.json"; then
+  cp tests/lint/package.json "$build/"
+  npm install --prefix "$build" --no-package-lock --ignore-scripts --no-audit --no-fund --loglevel=error ||
+    rm -f "$build/package.json"
+fi
+
+exec ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" "$@"
