@@ -10,11 +10,11 @@ deploy/install-packages.sh test
 cmake --preset dev
 cmake --build "$build"
 
-# The linter of the wire API is an npm package; without a network its test is skipped and says so.
+# The linter of the wire API is an npm package; where npm cannot fetch it, its test is skipped and says so.
 if ! cmp -s tests/lint/package.json "$build/package.json"; then
   cp tests/lint/package.json "$build/"
-  npm install --prefix "$build" --no-package-lock --ignore-scripts --no-audit --no-fund --loglevel=error ||
-    rm -f "$build/package.json"
+  npm install --prefix "$build" --no-package-lock --ignore-scripts --no-audit --no-fund --loglevel=error \
+      --fetch-retries=1 --fetch-retry-mintimeout=1000 || rm "$build/package.json"
 fi
 
 exec ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" "$@"
