@@ -16,35 +16,41 @@ enum class PairSelection {
   kSignalToNoise,    ///< Obs / sqrt(Ph): expected true votes over the noise of the false ones
 };
 
-/// Lengths |P Q1| and |P Q2| of the two vectors of a pair, as shares of the diameter.
+/// Lengths |P Q1| and |P Q2| of the two vectors of a pair, as shares of the diameter, [0.05, 0.9].
 struct PairLengths {
   double relative_q1 = 0.30;
   double relative_q2 = 0.22;
+
+  bool operator==(const PairLengths&) const = default;
 };
 
 /// How a mesh becomes a model. `relative_*`: share of the part's diameter.
 struct TrainParams {
   double relative_sampling = 0.045;                                      ///< spacing of the pair points, [0.02, 0.1]
   std::vector<PairLengths> pair_lengths = {{0.30, 0.22}, {0.22, 0.12}};  ///< 1 to 4 of them
-  double relative_length_tolerance = 0.02;                               ///< (0, 0.05]
+  double relative_length_tolerance = 0.02;                               ///< [0.001, 0.05]
   double bin_width = 0.20943951023931953;  ///< of a feature angle, radians (12 deg), [4, 45] deg
   int viewpoint_count = 500;               ///< K of [Eq. 5, 6], [16, 4096]
   PairSelection selection = PairSelection::kSignalToNoise;
-  double pairs_per_point = 3.0;         ///< N as a multiple of the model points, (0, 20]
+  double pairs_per_point = 3.0;         ///< N as a multiple of the model points, [0.001, 20]
   double observability_weight = 1.0;    ///< w1 of [Eq. 7], [0, 1000]
   double distinctiveness_weight = 1.0;  ///< w2 of [Eq. 7], [0, 1000]
 
   /// The paper's settings: one pair of lengths, N = 10 % of the model points, 1:1 integration.
   static TrainParams paper();
+
+  bool operator==(const TrainParams&) const = default;
 };
 
 /// How a cloud is searched.
 struct DetectParams {
-  double min_score = 0.4;                         ///< [0, 1]
-  int max_results = 100;                          ///< [1, 1000]
-  double start_point_share = 0.2;                 ///< share of the down-sampled points that pairs start from, (0, 1]
+  double min_score = 0.4;          ///< [0, 1]
+  int max_results = 100;           ///< [1, 1000]
+  double start_point_share = 0.2;  ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 0.17453292519943295;  ///< gate on pair normals, radians (10 deg), [2, 45] deg
   bool remove_support_plane = true;
+
+  bool operator==(const DetectParams&) const = default;
 };
 
 /// OK, or INVALID_ARGUMENT with a sentence that names field, value and range.
