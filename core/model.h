@@ -1,21 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/geometry/pose.h"
+#include "core/geometry/view_sphere.h"
+#include "core/pair_table.h"
 #include "core/params.h"
+#include "core/vector_pair.h"
 
 namespace binpose {
-
-/// A surface point of the model with its outward normal; model frame, metres.
-struct SurfacePoint {
-  Eigen::Vector3f position;
-  Eigen::Vector3f normal;
-};
 
 /// Rigid motions that leave the surface where it was, within a tolerance; model frame.
 struct Symmetry {
@@ -25,16 +22,30 @@ struct Symmetry {
   Eigen::Vector3d axis_direction = Eigen::Vector3d::UnitZ();
 };
 
-/// All that training produced; immutable once built and shared between threads. Saved and loaded by io/model_file.h,
-/// which writes the "stored" members and rebuilds the "derived" ones.
+/// All that training produced; immutable once built and shared between threads. io/model_file.h saves the stored
+/// members; derive() rebuilds the others.
 struct Model {
-  // Stored.
+  // Stored. Model frame, metres.
   TrainParams params;
-  double diameter = 0;  ///< largest distance between two vertices, metres
+  double diameter = 0;  ///< largest distance between two vertices
   Eigen::Vector3d box_min = Eigen::Vector3d::Zero();
   Eigen::Vector3d box_max = Eigen::Vector3d::Zero();
+  std::vector<SurfacePoint> surface;  ///< evenly spaced, progressive: any prefix is evenly spread as well
+  std::vector<ViewMask> visibility;   ///< per surface point: the viewpoints that see it [Eq. 5]
+  std::vector<SurfacePoint> pair_points;
+  std::vector<VectorPair> pairs;    ///< the selected pairs, best first; indices into `pair_points`
+  std::vector<float> pair_weights;  ///< of a vote of each pair
   Symmetry symmetry;
   std::vector<std::string> warnings;  ///< what is odd about the mesh, one sentence each
+
+  // Derived.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();      ///< of the bounding box: the point that is voted for
+  std::vector<Eigen::Vector3f> viewpoints;               ///< unit directions from the part to the viewer
+  std::vector<std::vector<std::uint16_t>> visible_from;  ///< per viewpoint: the surface points seen, in their order
+  PairTable pair_table;
 };
+
+/// Fills the derived members from the stored ones.
+void derive(Model& model);
 
 }  // namespace binpose

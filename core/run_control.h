@@ -4,14 +4,26 @@
 #include <optional>
 #include <stop_token>
 
+#include "absl/status/status.h"
+
 namespace binpose {
 
 /// When a computation should end early, and how many threads it may use. Results never depend on `threads`.
 struct RunControl {
-  std::stop_token stop;  ///< polled; a stop ends the call with CANCELLED within milliseconds
+  std::stop_token stop = {};  ///< polled; a stop ends the call with CANCELLED within milliseconds
   /// Training: DEADLINE_EXCEEDED. Detection: the best hypotheses so far, marked StopReason::kDeadline.
-  std::optional<std::chrono::steady_clock::time_point> deadline;
+  std::optional<std::chrono::steady_clock::time_point> deadline = {};
   int threads = 1;  ///< >= 1
+
+  bool past_deadline() const { return deadline && std::chrono::steady_clock::now() >= *deadline; }
+  /// Nobody waits for the rest.
+  bool interrupted() const { return stop.stop_requested() || past_deadline(); }
+  /// OK, CANCELLED or DEADLINE_EXCEEDED.
+  absl::Status status() const {
+    if (stop.stop_requested()) return absl::CancelledError("The caller cancelled the work.");
+    if (past_deadline()) return absl::DeadlineExceededError("The deadline passed before the work was done.");
+    return absl::OkStatus();
+  }
 };
 
 }  // namespace binpose

@@ -1,0 +1,203 @@
+#include "core/detect/detect.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/detect/cluster.h"
+#include "core/detect/rank.h"
+#include "core/detect/refine.h"
+#include "core/detect/scene_points.h"
+#include "core/detect/verify.h"
+#include "core/detect/vote.h"
+#include "core/geometry/depth_map.h"
+#include "core/geometry/normals.h"
+#include "core/parallel.h"
+
+namespace binpose {
+namespace {
+
+// Lengths as shares of the diameter D.
+constexpr double kRelativePixel = 0.014;
+constexpr double kPixelPerSpacing = 1.2;
+constexpr double kRelativeBlock = 0.042;
+constexpr float kClusterRadius = 0.06F;
+constexpr float kNeighbourhood = 0.25F;
+constexpr float kCoarseTolerance = 0.04F;
+constexpr float kFinalTolerance = 0.012F;
+constexpr float kFirstGate = 0.08F;
+constexpr float kLastGate = 0.025F;
+
+constexpr int kCoarsePoints = 80;
+constexpr int kClustersPerNeighbourhood = 30;
+constexpr int kMostClusters = 1500;
+constexpr int kRefinedPerNeighbourhood = 4;
+constexpr int kMostRefined = 200;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Adds the time of its scope to a figure.
+class StageTimer {
+ public:
+  explicit StageTimer(double& seconds) : seconds_(seconds) {}
+  ~StageTimer() { seconds_ += seconds_since(start_); }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+Eigen::Isometry3f pose_of(const PoseCluster& cluster, const Model& model) {
+  Eigen::Isometry3f T_view_model(cluster.q_view_model);
+  T_view_model.translation() = cluster.centre - T_view_model.linear() * model.centre.cast<float>();
+  return T_view_model;
+}
+
+/// Judges every candidate, in parallel.
+void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& options, const RunControl& control,
+                std::vector<Candidate>& candidates) {
+  parallel_for(static_cast<int>(candidates.size()), control.threads,
+               [&](int i) { candidates[i].evidence = verify(map, model, candidates[i].T_view_model, options); });
+}
+
+/// The best candidates of each neighbourhood, best first.
+std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, const Model& model, int per_place,
+                                          int most) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); });
+  const Eigen::Vector3f centre = model.centre.cast<float>();
+  const float reach = kNeighbourhood * static_cast<float>(model.diameter);
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : candidates) {
+    if (static_cast<int>(kept.size()) >= most) break;
+    const Eigen::Vector3f place = candidate.T_view_model * centre;
+    const auto around = std::count_if(kept.begin(), kept.end(), [&](const Candidate& other) {
+      return (other.T_view_model * centre - place).squaredNorm() < reach * reach;
+    });
+    if (around < per_place) kept.push_back(candidate);
+  }
+  return kept;
+}
+
+/// Votes, clusters and coarse verification: where the model may be.
+std::vector<Candidate> find_candidates(const DepthMap& map, const Model& model, int model_index,
+                                       const DetectParams& params, const RunControl& control, DetectStats& stats) {
+  const auto diameter = static_cast<float>(model.diameter);
+  Votes votes;
+  {
+    const StageTimer timer(stats.vote_seconds);
+    const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * diameter / map.pixel_size)));
+    const ScenePoints scene = down_sample(map, block);
+    const std::vector<int> starts = start_points(scene, params.start_point_share);
+    votes = vote(scene, starts, map, model, params, control);
+    stats.start_point_count += starts.size();
+    stats.scene_pair_count += votes.scene_pairs;
+    stats.vote_count += votes.votes.size();
+  }
+  std::vector<Candidate> candidates;
+  {
+    const StageTimer timer(stats.cluster_seconds);
+    ClusterOptions options;
+    options.radius = kClusterRadius * diameter;
+    options.neighbourhood = kNeighbourhood * diameter;
+    options.most_per_neighbourhood = kClustersPerNeighbourhood;
+    options.most = kMostClusters;
+    for (const PoseCluster& c : cluster(votes.votes, options)) {
+      candidates.push_back({model_index, pose_of(c, model), c.votes, {}});
+    }
+    stats.cluster_count += candidates.size();
+  }
+  const StageTimer timer(stats.verify_seconds);
+  VerifyOptions coarse;
+  coarse.tolerance = kCoarseTolerance * diameter;
+  coarse.normal_cosine = 0.7F;
+  coarse.most_points = kCoarsePoints;
+  verify_all(map, model, coarse, control, candidates);
+  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
+}
+
+VerifyOptions final_verification(const Model& model) {
+  VerifyOptions options;
+  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter);
+  return options;
+}
+
+/// Refines each candidate and keeps the better of before and after.
+void refine_all(const DepthMap& map, const Model& model, const RunControl& control, std::vector<Candidate>& candidates,
+                DetectStats& stats) {
+  {
+    const StageTimer timer(stats.refine_seconds);
+    RefineOptions options;
+    options.first_gate = kFirstGate * static_cast<float>(model.diameter);
+    options.last_gate = kLastGate * static_cast<float>(model.diameter);
+    parallel_for(static_cast<int>(candidates.size()), control.threads, [&](int i) {
+      if (control.interrupted()) return;
+      candidates[i].T_view_model = refine(map, model, candidates[i].T_view_model, options);
+    });
+  }
+  const StageTimer timer(stats.verify_seconds);
+  verify_all(map, model, final_verification(model), control, candidates);
+  stats.verified_count += candidates.size();
+}
+
+DepthMap prepare(const SensorView& view, const Model& model, const RunControl& control, DetectStats& stats) {
+  const StageTimer timer(stats.preprocess_seconds);
+  DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing));
+  if (view.normals.empty()) estimate_normals(map, 1, control.threads);
+  return map;
+}
+
+PoseHypothesis to_hypothesis(const Candidate& candidate, const DepthMap& map) {
+  PoseHypothesis hypothesis;
+  hypothesis.model_index = candidate.model_index;
+  hypothesis.T_scene_model = map.T_scene_view * Pose(candidate.T_view_model.cast<double>());
+  hypothesis.score = candidate.evidence.score();
+  hypothesis.visible_fraction = 1 - candidate.evidence.occluded;
+  hypothesis.explained_fraction = candidate.evidence.explained;
+  hypothesis.violated_fraction = candidate.evidence.violated;
+  hypothesis.residual = candidate.evidence.residual;
+  hypothesis.votes = candidate.votes;
+  return hypothesis;
+}
+
+}  // namespace
+
+absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Model* const> models,
+                                    const DetectParams& params, const RunControl& control) {
+  if (absl::Status status = validate(params); !status.ok()) return status;
+  if (models.empty()) return absl::InvalidArgumentError("models is empty; it must name at least 1.");
+  const auto start = std::chrono::steady_clock::now();
+  DetectResult result;
+  const absl::StatusOr<SensorView> view = sensor_view(cloud);
+  if (!view.ok()) return view.status();
+  result.stats.point_count = view->points.size();
+
+  DepthMap finest;
+  std::vector<Candidate> candidates;
+  VerifyOptionsOf final_options;
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (control.stop.stop_requested()) return control.status();
+    const Model& model = *models[m];
+    DepthMap map = prepare(*view, model, control, result.stats);
+    std::vector<Candidate> found = find_candidates(map, model, static_cast<int>(m), params, control, result.stats);
+    refine_all(map, model, control, found, result.stats);
+    candidates.insert(candidates.end(), found.begin(), found.end());
+    final_options.push_back(final_verification(model));
+    if (m == 0 || map.pixel_size < finest.pixel_size) finest = std::move(map);
+  }
+  if (control.stop.stop_requested()) return control.status();
+  {
+    const StageTimer timer(result.stats.rank_seconds);
+    for (const Candidate& c : rank(finest, models, final_options, std::move(candidates), params.min_score)) {
+      result.hypotheses.push_back(to_hypothesis(c, finest));
+    }
+  }
+  result.stats.total_seconds = seconds_since(start);
+  return result;
+}
+
+}  // namespace binpose

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "core/geometry/depth_map.h"
+#include "core/model.h"
+
+namespace binpose {
+
+/// How a pose is refined.
+struct RefineOptions {
+  float first_gate = 0;  ///< metres: correspondences farther apart do not count at first ...
+  float last_gate = 0;   ///< ... and at the end
+  int iterations = 6;
+  int most_points = 200;
+};
+
+/// Projective point-to-plane ICP: each visible model point is drawn to the plane of the pixel that it falls on
+/// [paper, section IV 5, by Gauss-Newton in place of a search].
+Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
+                         const RefineOptions& options);
+
+}  // namespace binpose

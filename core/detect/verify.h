@@ -1,0 +1,38 @@
+#pragma once
+
+#include <limits>
+
+#include "core/geometry/depth_map.h"
+#include "core/model.h"
+
+namespace binpose {
+
+/// How closely scene and model must agree.
+struct VerifyOptions {
+  float tolerance = 0;                                ///< metres along the normal
+  float normal_cosine = 0.8F;                         ///< least cosine between scene and model normal
+  int most_points = std::numeric_limits<int>::max();  ///< check only a prefix of the view's points
+};
+
+/// What the sensor saw of the surface that a pose says it should see. Shares of all points visible from that side.
+struct Evidence {
+  float explained = 0;    ///< measured where the model is
+  float violated = 0;     ///< measured clearly behind: the sensor looked through the model
+  float occluded = 0;     ///< measured clearly in front: something hides the model
+  float unexplained = 0;  ///< measured near, with another normal
+  float residual = 0;     ///< root mean square distance of the explained points, metres
+
+  /// Explained share less what the scene contradicts, in [0, 1].
+  float score() const;
+};
+
+/// The points of the model that a viewer at the origin sees of it, as a list into Model::surface.
+const std::vector<std::uint16_t>& visible_points(const Model& model, const Eigen::Isometry3f& T_view_model);
+
+/// Compares the visible surface of a pose with the depth map, point by point.
+///
+/// @param owned  per pixel 1 = explained by a better hypothesis already, which leaves it unexplained here; or null.
+Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
+                const VerifyOptions& options, const std::vector<std::uint8_t>* owned = nullptr);
+
+}  // namespace binpose

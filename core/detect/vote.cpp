@@ -1,0 +1,159 @@
+#include "core/detect/vote.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "core/train/vector_pairs.h"
+
+namespace binpose {
+namespace {
+
+constexpr int kStartsPerTask = 32;
+
+using Lanes = std::int16_t __attribute__((vector_size(2 * PairTable::kBlock)));
+
+/// Bit i is set when all three normals of pair i agree with the scene's: dot products at least `least`.
+unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9], std::int16_t least) {
+  Lanes agree = {};
+  agree = ~agree;
+  for (int k = 0; k < 3; ++k) {
+    Lanes dot = {};
+    for (int c = 0; c < 3; ++c) {
+      Lanes component;
+      __builtin_memcpy(&component, block.normals[3 * k + c], sizeof(component));
+      dot += component * scene[3 * k + c];
+    }
+    agree &= dot >= least;
+  }
+  unsigned bits = 0;
+  for (int lane = 0; lane < PairTable::kBlock; ++lane) bits |= (agree[lane] & 1U) << lane;
+  return bits;
+}
+
+/// Scene points at a pair's length from P.
+struct Ring {
+  std::vector<int> points;
+  std::vector<Eigen::Vector3f> directions;
+  void clear() {
+    points.clear();
+    directions.clear();
+  }
+};
+
+/// Forms and matches the pairs of one start point after the other.
+class PairMatcher {
+ public:
+  PairMatcher(const ScenePoints& scene, const DepthMap& map, const Model& model, const DetectParams& params)
+      : scene_(scene), map_(map), model_(model), rings_(2 * model.params.pair_lengths.size()) {
+    least_ =
+        static_cast<std::int16_t>(std::lround(PairTable::kUnit * PairTable::kUnit * std::cos(params.normal_tolerance)));
+    for (const PairLengths& lengths : model.params.pair_lengths) {
+      longest_ = std::max({longest_, lengths.relative_q1, lengths.relative_q2});
+    }
+    longest_ = (longest_ + model.params.relative_length_tolerance) * model.diameter;
+  }
+
+  void match(int start, Votes& out) {
+    collect_rings(start);
+    for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
+      const Ring &q1s = rings_[2 * scale], &q2s = rings_[2 * scale + 1];
+      for (std::size_t a = 0; a < q1s.points.size(); ++a) {
+        for (std::size_t b = 0; b < q2s.points.size(); ++b) {
+          if (std::abs(q1s.directions[a].dot(q2s.directions[b])) > kRightAngleCosine) continue;
+          match_pair(static_cast<int>(scale), start, q1s.points[a], q2s.points[b], out);
+        }
+      }
+    }
+  }
+
+ private:
+  void collect_rings(int start) {
+    for (Ring& ring : rings_) ring.clear();
+    const Eigen::Vector3f& p = scene_.points[start].position;
+    const double reach = longest_ * map_.focal / std::max(1e-6, p.z() - longest_) + scene_.block_size;
+    const float u = map_.focal * p.x() / p.z() + map_.cx, v = map_.focal * p.y() / p.z() + map_.cy;
+    const int first_column = std::max(0, static_cast<int>((u - reach) / scene_.block_size));
+    const int last_column = std::min(scene_.columns - 1, static_cast<int>((u + reach) / scene_.block_size));
+    const int first_row = std::max(0, static_cast<int>((v - reach) / scene_.block_size));
+    const int last_row = std::min(scene_.rows - 1, static_cast<int>((v + reach) / scene_.block_size));
+    for (int row = first_row; row <= last_row; ++row) {
+      for (int column = first_column; column <= last_column; ++column) {
+        const int index = scene_.of_block[static_cast<std::size_t>(row) * scene_.columns + column];
+        if (index >= 0 && index != start) sort_into_rings(index, scene_.points[index].position - p);
+      }
+    }
+  }
+
+  void sort_into_rings(int index, const Eigen::Vector3f& offset) {
+    const float distance = offset.norm();
+    if (distance > longest_) return;
+    const double tolerance = model_.params.relative_length_tolerance;
+    const double relative = distance / model_.diameter;
+    for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
+      const PairLengths& lengths = model_.params.pair_lengths[scale];
+      if (std::abs(relative - lengths.relative_q1) <= tolerance) add(rings_[2 * scale], index, offset / distance);
+      if (std::abs(relative - lengths.relative_q2) <= tolerance) add(rings_[2 * scale + 1], index, offset / distance);
+    }
+  }
+
+  static void add(Ring& ring, int index, const Eigen::Vector3f& direction) {
+    ring.points.push_back(index);
+    ring.directions.push_back(direction);
+  }
+
+  void match_pair(int scale, int p, int q1, int q2, Votes& out) {
+    const SurfacePoint &start = scene_.points[p], &end1 = scene_.points[q1], &end2 = scene_.points[q2];
+    const Eigen::Matrix3f M_s = pair_frame(start.position, end1.position, end2.position);
+    const PairNormals normals = pair_normals(M_s, start, end1, end2);
+    std::int16_t scaled[9];
+    for (int i = 0; i < 9; ++i) {
+      scaled[i] = static_cast<std::int16_t>(std::lrintf(PairTable::kUnit * normals(i % 3, i / 3)));
+    }
+    ++out.scene_pairs;
+    Eigen::Quaternionf q_view_frame;
+    bool have_rotation = false;
+    for (const PairTable::Block& block : model_.pair_table.find(scale, model_.pair_table.bins().bin(normals))) {
+      for (unsigned bits = agreeing(block, scaled, least_); bits != 0; bits &= bits - 1) {
+        const std::uint32_t pair = block.pair[__builtin_ctz(bits)];
+        if (!have_rotation) q_view_frame = Eigen::Quaternionf(M_s);
+        have_rotation = true;
+        const PairTable::Vote& vote = model_.pair_table.vote(pair);
+        out.votes.push_back({start.position + M_s * vote.centre_in_frame, vote.weight,
+                             q_view_frame * vote.rotation_frame_model});  // Eq. (8)
+      }
+    }
+  }
+
+  const ScenePoints& scene_;
+  const DepthMap& map_;
+  const Model& model_;
+  std::vector<Ring> rings_;  // q1 and q2 of each scale
+  double longest_ = 0;
+  std::int16_t least_ = 0;
+};
+
+}  // namespace
+
+Votes vote(const ScenePoints& scene, std::span<const int> starts, const DepthMap& map, const Model& model,
+           const DetectParams& params, const RunControl& control) {
+  const int tasks = (static_cast<int>(starts.size()) + kStartsPerTask - 1) / kStartsPerTask;
+  std::vector<Votes> parts(tasks);
+  parallel_for(tasks, control.threads, [&](int task) {
+    if (control.interrupted()) return;
+    PairMatcher matcher(scene, map, model, params);
+    const std::size_t last = std::min<std::size_t>(starts.size(), (task + 1) * kStartsPerTask);
+    for (std::size_t i = task * kStartsPerTask; i < last; ++i) matcher.match(starts[i], parts[task]);
+  });
+  Votes all;
+  std::size_t count = 0;
+  for (const Votes& part : parts) count += part.votes.size();
+  all.votes.reserve(count);
+  for (const Votes& part : parts) {
+    all.votes.insert(all.votes.end(), part.votes.begin(), part.votes.end());
+    all.scene_pairs += part.scene_pairs;
+  }
+  return all;
+}
+
+}  // namespace binpose

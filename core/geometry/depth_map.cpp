@@ -1,0 +1,145 @@
+#include "core/geometry/depth_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_format.h"
+
+namespace binpose {
+namespace {
+
+constexpr double kMostPixels = 4e6;
+/// Points farther than this off the viewing direction are left out: tan 72 degrees.
+constexpr float kWidestTangent = 3;
+
+absl::Status check_cloud(const PointCloud& cloud) {
+  const std::size_t count = static_cast<std::size_t>(cloud.width) * cloud.height;
+  if (count != cloud.points.size()) {
+    return absl::InvalidArgumentError(absl::StrFormat("cloud has %d points; width x height is %d x %d = %d.",
+                                                      cloud.points.size(), cloud.width, cloud.height, count));
+  }
+  if (count == 0) return absl::InvalidArgumentError("cloud has 0 points; it must have at least 1.");
+  if (!cloud.normals.empty() && cloud.normals.size() != count) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "cloud has %d normals for %d points; it must have one each, or none.", cloud.normals.size(), count));
+  }
+  if (!cloud.sensor_position.allFinite()) {
+    return absl::InvalidArgumentError("cloud sensor_position is not a finite number.");
+  }
+  return absl::OkStatus();
+}
+
+/// The box of x/z and y/z that all points fall into.
+struct Window {
+  float low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
+  explicit Window(const std::vector<Eigen::Vector3f>& points) {
+    for (const Eigen::Vector3f& p : points) {
+      low_x = std::min(low_x, p.x() / p.z());
+      high_x = std::max(high_x, p.x() / p.z());
+      low_y = std::min(low_y, p.y() / p.z());
+      high_y = std::max(high_y, p.y() / p.z());
+    }
+  }
+};
+
+float median_depth(const std::vector<Eigen::Vector3f>& points) {
+  std::vector<float> depths(points.size());
+  std::transform(points.begin(), points.end(), depths.begin(), [](const Eigen::Vector3f& p) { return p.z(); });
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+/// Side of a coarse cell over the root of the median count of points in it.
+float point_spacing(const std::vector<Eigen::Vector3f>& points, float depth) {
+  const Window window(points);
+  const float area = std::max((window.high_x - window.low_x) * (window.high_y - window.low_y), 1e-12F);
+  const float cell = 5 * std::sqrt(area / static_cast<float>(points.size()));
+  const int columns = static_cast<int>((window.high_x - window.low_x) / cell) + 1;
+  const int rows = static_cast<int>((window.high_y - window.low_y) / cell) + 1;
+  if (static_cast<double>(columns) * rows > kMostPixels) return depth * cell / 5;  // all points on a line
+  std::vector<int> counts(static_cast<std::size_t>(columns) * rows, 0);
+  for (const Eigen::Vector3f& p : points) {
+    const int column = std::min(columns - 1, static_cast<int>((p.x() / p.z() - window.low_x) / cell));
+    const int row = std::min(rows - 1, static_cast<int>((p.y() / p.z() - window.low_y) / cell));
+    ++counts[static_cast<std::size_t>(row) * columns + column];
+  }
+  std::erase(counts, 0);
+  const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+  std::nth_element(counts.begin(), middle, counts.end());
+  return depth * cell / std::sqrt(static_cast<float>(*middle));
+}
+
+}  // namespace
+
+absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
+  if (absl::Status status = check_cloud(cloud); !status.ok()) return status;
+  const Eigen::Vector3f sensor = cloud.sensor_position.cast<float>();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& p : cloud.points) {
+    if (p.allFinite() && p != sensor) direction += (p - sensor).normalized().cast<double>();
+  }
+  if (!(direction.norm() > 0)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "cloud has no measurement among its %d points; at least one must have finite x, y, z away from the sensor.",
+        cloud.points.size()));
+  }
+
+  SensorView view;
+  view.T_scene_view.linear() =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction.normalized()).toRotationMatrix();
+  view.T_scene_view.translation() = cloud.sensor_position;
+  const Eigen::Matrix3f R_view_scene = view.T_scene_view.linear().transpose().cast<float>();
+  view.points.reserve(cloud.points.size());
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
+    if (!p.allFinite() || !(p.z() > 1e-6F) || std::max(std::abs(p.x()), std::abs(p.y())) > kWidestTangent * p.z()) {
+      continue;
+    }
+    view.points.push_back(p);
+    if (!cloud.normals.empty()) view.normals.push_back(R_view_scene * cloud.normals[i]);
+  }
+  if (view.points.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("cloud has no point in front of the sensor at (%g, %g, %g) m; set sensor_position to where it "
+                        "was measured from.",
+                        cloud.sensor_position.x(), cloud.sensor_position.y(), cloud.sensor_position.z()));
+  }
+  view.median_depth = median_depth(view.points);
+  view.spacing = point_spacing(view.points, view.median_depth);
+  return view;
+}
+
+DepthMap depth_map(const SensorView& view, double pixel_size) {
+  const Window window(view.points);
+  const double width_tan = window.high_x - window.low_x, height_tan = window.high_y - window.low_y;
+  double pixel_tan = pixel_size / view.median_depth;
+  pixel_tan = std::max({pixel_tan, std::sqrt(width_tan * height_tan / kMostPixels),
+                        std::max(width_tan, height_tan) / (0.1 * kMostPixels), 1e-9});
+
+  DepthMap map;
+  map.T_scene_view = view.T_scene_view;
+  map.focal = static_cast<float>(1 / pixel_tan);
+  map.pixel_size = static_cast<float>(pixel_tan * view.median_depth);
+  map.cx = -window.low_x * map.focal;
+  map.cy = -window.low_y * map.focal;
+  map.width = static_cast<int>(width_tan / pixel_tan + 0.5) + 1;
+  map.height = static_cast<int>(height_tan / pixel_tan + 0.5) + 1;
+  const std::size_t count = static_cast<std::size_t>(map.width) * map.height;
+  map.points.assign(count, Eigen::Vector3f::Zero());
+  map.normals.assign(count, Eigen::Vector3f::Zero());
+  map.background.assign(count, 0);
+  for (std::size_t i = 0; i < view.points.size(); ++i) {
+    const int pixel = map.pixel_of(view.points[i]);
+    if (pixel < 0 || (map.measured(pixel) && map.points[pixel].z() <= view.points[i].z())) continue;
+    map.points[pixel] = view.points[i];
+    if (view.normals.empty()) continue;
+    const Eigen::Vector3f& n = view.normals[i];
+    const float sign = n.dot(view.points[i]) > 0 ? -1.0F : 1.0F;
+    map.normals[pixel] =
+        n.allFinite() && n.norm() > 0.5F ? Eigen::Vector3f(sign * n.normalized()) : Eigen::Vector3f::Zero();
+  }
+  return map;
+}
+
+}  // namespace binpose

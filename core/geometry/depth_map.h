@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <Eigen/Core>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/geometry/point_cloud.h"
+#include "core/geometry/pose.h"
+
+namespace binpose {
+
+/// A cloud as the sensor saw it: the nearest point of each cell of a pinhole image. The structure that normals,
+/// verification, refinement and suppression all read.
+///
+/// View frame: origin at the sensor, z from the sensor to the middle of the cloud.
+struct DepthMap {
+  Pose T_scene_view = Pose::Identity();
+  int width = 0, height = 0;
+  float focal = 1;                       ///< pixels, both axes
+  float cx = 0, cy = 0;                  ///< principal point, pixels; (0, 0) = centre of the first pixel
+  float pixel_size = 0;                  ///< metres that a pixel spans across the view at the median depth
+  std::vector<Eigen::Vector3f> points;   ///< row by row, view frame; z = 0: nothing measured
+  std::vector<Eigen::Vector3f> normals;  ///< unit, towards the sensor; zero: none
+  std::vector<std::uint8_t> background;  ///< 1: belongs to the support plane
+
+  bool measured(int i) const { return points[i].z() > 0; }
+  bool has_normal(int i) const { return normals[i].z() != 0; }
+  /// Index of the pixel that a point of the view frame falls into, or -1 outside of the image. z must be > 0.
+  int pixel_of(const Eigen::Vector3f& p) const {
+    const float u = focal * p.x() / p.z() + cx + 0.5F, v = focal * p.y() / p.z() + cy + 0.5F;
+    if (!(u >= 0 && v >= 0 && u < static_cast<float>(width) && v < static_cast<float>(height))) return -1;
+    return static_cast<int>(v) * width + static_cast<int>(u);
+  }
+};
+
+/// The measured points of a cloud, seen from its sensor.
+struct SensorView {
+  Pose T_scene_view = Pose::Identity();
+  std::vector<Eigen::Vector3f> points;   ///< in front of the sensor, view frame
+  std::vector<Eigen::Vector3f> normals;  ///< of the points, or empty
+  float median_depth = 0;                ///< metres
+  float spacing = 0;                     ///< typical distance of neighbouring points across the view, metres
+};
+
+/// Errors: INVALID_ARGUMENT when width x height does not fit the points, when no point is finite, or when none lies in
+/// front of the sensor.
+absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud);
+
+/// Projects the points to pixels of `pixel_size` metres at the median depth (or larger ones, so that the image has at
+/// most 4 million). Normals that came with the cloud are kept, otherwise none are set.
+DepthMap depth_map(const SensorView& view, double pixel_size);
+
+}  // namespace binpose

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "core/geometry/depth_map.h"
+
+namespace binpose {
+
+/// Sets the normal of every measured pixel that has enough neighbours: the plane through its window, fitted as inverse
+/// depth over the image, where every plane is linear. Neighbours across a depth step are left out; pixels seen under
+/// more than 80 degrees get no normal.
+///
+/// @param radius  of the window, pixels: 1 = 3 x 3.
+/// Deterministic on any number of threads.
+void estimate_normals(DepthMap& map, int radius, int threads);
+
+}  // namespace binpose

@@ -1,0 +1,245 @@
+#include "core/io/model_file.h"
+
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_format.h"
+
+namespace binpose {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are stored as they lie in memory");
+
+constexpr std::string_view kMagic = "binpose\n";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeaderBytes = kMagic.size() + sizeof(std::uint32_t) + sizeof(std::uint64_t);
+constexpr std::size_t kMostListed = 1U << 20;  // entries of a list; far above what training produces
+
+using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
+
+Digest sha256(std::string_view bytes) {
+  Digest digest;
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest.data());
+  return digest;
+}
+
+/// Appends values to a string of bytes.
+class Writer {
+ public:
+  template <typename T>
+  void number(T& value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  }
+  /// Length of a list, then room for the caller to visit its entries.
+  template <typename List>
+  void length(List& list) {
+    auto count = static_cast<std::uint32_t>(list.size());
+    number(count);
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+/// Takes values from bytes; after the end every value is zero and ok() is false.
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+  template <typename T>
+  void number(T& value) {
+    value = T{};
+    ok_ = ok_ && bytes_.size() >= sizeof(value);
+    if (!ok_) return;
+    std::memcpy(&value, bytes_.data(), sizeof(value));
+    bytes_.remove_prefix(sizeof(value));
+  }
+  /// Makes room for as many entries as the length says, unless the bytes that are left can't hold them.
+  template <typename List>
+  void length(List& list) {
+    std::uint32_t count = 0;
+    number(count);
+    ok_ = ok_ && count <= std::min(kMostListed, bytes_.size());
+    list.resize(ok_ ? count : 0);
+  }
+  bool ok() const { return ok_; }
+  bool at_end() const { return bytes_.empty(); }
+
+ private:
+  std::string_view bytes_;
+  bool ok_ = true;
+};
+
+// One visit function per type serves both directions, so that what is written and what is read can't drift apart.
+
+template <typename Archive, typename Derived>
+void visit(Archive& archive, Eigen::MatrixBase<Derived>& matrix) {
+  for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
+    for (Eigen::Index r = 0; r < matrix.rows(); ++r) archive.number(matrix(r, c));
+  }
+}
+
+template <typename Archive>
+void visit(Archive& archive, std::string& text) {
+  archive.length(text);
+  for (char& c : text) archive.number(c);
+}
+
+template <typename Archive>
+void visit(Archive& archive, Pose& pose) {
+  for (int i = 0; i < 12; ++i) archive.number(pose.matrix()(i / 4, i % 4));
+}
+
+template <typename Archive>
+void visit(Archive& archive, std::vector<SurfacePoint>& points) {
+  archive.length(points);
+  for (SurfacePoint& point : points) {
+    visit(archive, point.position);
+    visit(archive, point.normal);
+  }
+}
+
+template <typename Archive>
+void visit(Archive& archive, TrainParams& params) {
+  archive.number(params.relative_sampling);
+  archive.length(params.pair_lengths);
+  for (PairLengths& lengths : params.pair_lengths) {
+    archive.number(lengths.relative_q1);
+    archive.number(lengths.relative_q2);
+  }
+  archive.number(params.relative_length_tolerance);
+  archive.number(params.bin_width);
+  archive.number(params.viewpoint_count);
+  auto selection = static_cast<std::int32_t>(params.selection);
+  archive.number(selection);
+  params.selection = static_cast<PairSelection>(selection);
+  archive.number(params.pairs_per_point);
+  archive.number(params.observability_weight);
+  archive.number(params.distinctiveness_weight);
+}
+
+template <typename Archive>
+void visit(Archive& archive, Symmetry& symmetry) {
+  archive.length(symmetry.discrete);
+  for (Pose& pose : symmetry.discrete) visit(archive, pose);
+  auto has_axis = static_cast<std::uint8_t>(symmetry.has_axis);
+  archive.number(has_axis);
+  symmetry.has_axis = has_axis != 0;
+  visit(archive, symmetry.axis_point);
+  visit(archive, symmetry.axis_direction);
+}
+
+template <typename Archive>
+void visit(Archive& archive, Model& model) {
+  visit(archive, model.params);
+  archive.number(model.diameter);
+  visit(archive, model.box_min);
+  visit(archive, model.box_max);
+  visit(archive, model.surface);
+  archive.length(model.visibility);
+  const int words = (std::clamp(model.params.viewpoint_count, 0, 4096) + 63) / 64;
+  for (ViewMask& mask : model.visibility) {
+    mask.resize(words);
+    for (std::uint64_t& word : mask) archive.number(word);
+  }
+  visit(archive, model.pair_points);
+  archive.length(model.pairs);
+  for (VectorPair& pair : model.pairs) archive.number(pair);
+  archive.length(model.pair_weights);
+  for (float& weight : model.pair_weights) archive.number(weight);
+  visit(archive, model.symmetry);
+  archive.length(model.warnings);
+  for (std::string& warning : model.warnings) visit(archive, warning);
+}
+
+std::string payload_of(const Model& model) {
+  Writer writer;
+  visit(writer, const_cast<Model&>(model));  // a Writer changes nothing
+  return writer.bytes();
+}
+
+bool sound(const std::vector<SurfacePoint>& points) {
+  return points.size() <= 65535 && std::all_of(points.begin(), points.end(), [](const SurfacePoint& p) {
+           return p.position.allFinite() && std::abs(p.normal.norm() - 1) < 1e-3;
+         });
+}
+
+/// What derive() and detection rely on.
+bool invariants_hold(const Model& model) {
+  const std::size_t points = model.pair_points.size(), scales = model.params.pair_lengths.size();
+  return validate(model.params).ok() && model.params.selection >= PairSelection::kDistinctiveness &&
+         model.params.selection <= PairSelection::kSignalToNoise && model.diameter > 0 &&
+         std::isfinite(model.diameter) && model.box_min.allFinite() && model.box_max.allFinite() &&
+         sound(model.surface) && sound(model.pair_points) && model.visibility.size() == model.surface.size() &&
+         model.pair_weights.size() == model.pairs.size() && !model.symmetry.discrete.empty() &&
+         std::all_of(model.pair_weights.begin(), model.pair_weights.end(),
+                     [](float weight) { return std::isfinite(weight) && weight >= 0; }) &&
+         std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
+           return pair.p < points && pair.q1 < points && pair.q2 < points && pair.p != pair.q1 && pair.p != pair.q2 &&
+                  pair.q1 != pair.q2 && pair.scale < scales;
+         });
+}
+
+}  // namespace
+
+std::string serialize_model(const Model& model) {
+  const std::string payload = payload_of(model);
+  const Digest digest = sha256(payload);
+  Writer header;
+  std::uint32_t version = kVersion;
+  std::uint64_t size = payload.size();
+  header.number(version);
+  header.number(size);
+  std::string bytes(kMagic);
+  bytes += header.bytes();
+  bytes += payload;
+  bytes.append(reinterpret_cast<const char*>(digest.data()), digest.size());
+  return bytes;
+}
+
+absl::StatusOr<Model> parse_model(std::string_view bytes) {
+  if (bytes.size() < kHeaderBytes || bytes.substr(0, kMagic.size()) != kMagic) {
+    return absl::DataLossError("not a binpose model: it does not begin with the format's magic number.");
+  }
+  Reader header(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()));
+  std::uint32_t version = 0;
+  std::uint64_t size = 0;
+  header.number(version);
+  header.number(size);
+  if (version != kVersion) {
+    return absl::UnimplementedError(absl::StrFormat(
+        "model format version is %d; this program reads version %d. Train the part again.", version, kVersion));
+  }
+  const std::size_t left = bytes.size() - kHeaderBytes;
+  if (left < SHA256_DIGEST_LENGTH || size != left - SHA256_DIGEST_LENGTH) {
+    return absl::DataLossError(
+        absl::StrFormat("model has %d bytes after its header; it states a payload of %d and a checksum of %d.", left,
+                        size, SHA256_DIGEST_LENGTH));
+  }
+  const std::string_view payload = bytes.substr(kHeaderBytes, size);
+  const Digest digest = sha256(payload);
+  if (std::memcmp(digest.data(), payload.data() + payload.size(), digest.size()) != 0) {
+    return absl::DataLossError("model has a wrong checksum: the file is damaged.");
+  }
+  Reader reader(payload);
+  Model model;
+  visit(reader, model);
+  if (!reader.ok() || !reader.at_end() || !invariants_hold(model)) {
+    return absl::DataLossError("model contradicts itself: a length, index or number is out of its range.");
+  }
+  derive(model);
+  return model;
+}
+
+std::string content_hash(const Model& model) {
+  const Digest digest = sha256(payload_of(model));
+  return absl::BytesToHexString({reinterpret_cast<const char*>(digest.data()), digest.size()});
+}
+
+}  // namespace binpose

@@ -1,0 +1,26 @@
+#include "core/model.h"
+
+namespace binpose {
+namespace {
+
+/// Noise of a scene pair's feature angles that a look-up forgives, radians (6 degrees: half a bin of the paper's).
+constexpr double kBinMargin = 0.10471975511965977;
+
+}  // namespace
+
+void derive(Model& model) {
+  model.centre = 0.5 * (model.box_min + model.box_max);
+  model.viewpoints = view_directions(model.params.viewpoint_count);
+  model.visible_from.assign(model.viewpoints.size(), {});
+  for (std::size_t i = 0; i < model.surface.size(); ++i) {
+    for (std::size_t k = 0; k < model.viewpoints.size(); ++k) {
+      if (sees(model.visibility[i], static_cast<int>(k))) {
+        model.visible_from[k].push_back(static_cast<std::uint16_t>(i));
+      }
+    }
+  }
+  model.pair_table = PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
+                               static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin);
+}
+
+}  // namespace binpose

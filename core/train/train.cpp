@@ -1,0 +1,97 @@
+#include "core/train/train.h"
+
+#include <cmath>
+
+#include "core/train/mesh_extent.h"
+#include "core/train/sample_surface.h"
+#include "core/train/select.h"
+#include "core/train/vector_pairs.h"
+#include "core/train/visibility.h"
+
+namespace binpose {
+namespace {
+
+/// Spacing of the points that verification and refinement use, as a share of the diameter.
+constexpr double kRelativeSurfaceSpacing = 0.03;
+/// Spacing of the points that stand for the whole surface in projections.
+constexpr double kRelativeDenseSpacing = 0.007;
+constexpr double kRelativeCell = 0.02;
+constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
+
+/// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
+std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter) {
+  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter);
+  constexpr int kViewsToTellTheSides = 60;
+  const std::vector<bool> behind =
+      seen_from_behind(dense, view_directions(kViewsToTellTheSides), kRelativeCell * diameter);
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    if (behind[i]) dense[i].normal = -dense[i].normal;
+  }
+  return dense;
+}
+
+/// Pairs of one scale, selected [Eq. 2-7], appended to the model.
+void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>& masks, std::size_t count,
+                  Model& model) {
+  const int views = model.params.viewpoint_count;
+  const std::vector<double> ph = occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width));
+  std::vector<double> values(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const double obs = observability(masks[pairs[i].p], masks[pairs[i].q1], masks[pairs[i].q2], views);
+    values[i] = pair_value(obs, ph[i], model.params);
+  }
+  for (const std::size_t i : best_pairs(values, count)) {
+    model.pairs.push_back(pairs[i]);
+    // A vote for a frequent feature says less: its false votes are more.
+    model.pair_weights.push_back(static_cast<float>(1 / std::sqrt(ph[i] * static_cast<double>(pairs.size()))));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const RunControl& control,
+                            const TrainObserver& observer) {
+  const auto enter = [&](TrainStage stage, double progress) {
+    if (observer) observer(stage, progress);
+    return control.status();
+  };
+  if (absl::Status status = validate(params); !status.ok()) return status;
+  if (absl::Status status = check_mesh(mesh); !status.ok()) return status;
+
+  if (absl::Status status = enter(TrainStage::kSampling, 0.0); !status.ok()) return status;
+  Model model;
+  model.params = params;
+  const MeshExtent extent = mesh_extent(mesh);
+  model.diameter = extent.diameter;
+  model.box_min = extent.box_min;
+  model.box_max = extent.box_max;
+  const std::vector<SurfacePoint> dense = outer_surface(mesh, model.diameter);
+  model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter);
+  model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter);
+  if (model.surface.size() > kMostPoints || model.pair_points.size() > kMostPoints) {
+    return absl::InvalidArgumentError(
+        "mesh has too much inner or folded surface for its diameter; remove inner structure from the CAD export.");
+  }
+
+  if (absl::Status status = enter(TrainStage::kVisibility, 0.1); !status.ok()) return status;
+  const std::vector<Eigen::Vector3f> viewpoints = view_directions(params.viewpoint_count);
+  model.visibility = visibility(dense, model.surface, viewpoints, kRelativeCell * model.diameter, control);
+  const std::vector<ViewMask> pair_masks =
+      visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
+
+  const int scales = static_cast<int>(params.pair_lengths.size());
+  const auto pairs_per_scale = static_cast<std::size_t>(
+      std::ceil(params.pairs_per_point * static_cast<double>(model.pair_points.size()) / scales));
+  for (int scale = 0; scale < scales; ++scale) {
+    if (absl::Status status = enter(TrainStage::kVectorPairs, 0.5 + 0.4 * scale / scales); !status.ok()) return status;
+    select_pairs(vector_pairs(model.pair_points, params.pair_lengths[scale], params.relative_length_tolerance,
+                              model.diameter, scale, control),
+                 pair_masks, pairs_per_scale, model);
+  }
+
+  if (absl::Status status = enter(TrainStage::kSymmetry, 0.9); !status.ok()) return status;
+  derive(model);
+  return model;
+}
+
+}  // namespace binpose

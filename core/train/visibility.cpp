@@ -1,0 +1,110 @@
+#include "core/train/visibility.h"
+
+#include <Eigen/Geometry>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "core/parallel.h"
+
+namespace binpose {
+namespace {
+
+constexpr float kGrazingCosine = 0.17364818F;  // 80 degrees off the view
+
+/// The nearest surface in each cell of a plane across the view. Depths count towards the viewer.
+class ProjectionPlane {
+ public:
+  ProjectionPlane(std::span<const SurfacePoint> dense, const Eigen::Vector3f& viewpoint, float cell)
+      : towards_viewer_(viewpoint), right_(viewpoint.unitOrthogonal()), up_(viewpoint.cross(right_)), cell_(cell) {
+    Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = Eigen::Array2f::Constant(-INFINITY);
+    for (const SurfacePoint& point : dense) {
+      const Eigen::Array2f at = across(point.position);
+      low = low.min(at);
+      high = high.max(at);
+    }
+    origin_ = low;
+    width_ = static_cast<int>((high[0] - low[0]) / cell) + 1;
+    const int height = static_cast<int>((high[1] - low[1]) / cell) + 1;
+    nearest_.assign(static_cast<std::size_t>(width_) * height, -INFINITY);
+    for (const SurfacePoint& point : dense) {
+      float& nearest = nearest_[index(point.position)];
+      nearest = std::max(nearest, towards_viewer_.dot(point.position));
+    }
+  }
+
+  /// Whether nothing lies in front of the point, whichever way its normal looks.
+  bool reaches(const SurfacePoint& point) const {
+    const float cosine = std::abs(towards_viewer_.dot(point.normal));
+    const float slope = std::sqrt(std::max(0.0F, 1 - cosine * cosine)) / std::max(cosine, kGrazingCosine);
+    return towards_viewer_.dot(point.position) >= nearest_[index(point.position)] - cell_ * (0.3F + 1.2F * slope);
+  }
+
+  float cosine(const SurfacePoint& point) const { return towards_viewer_.dot(point.normal); }
+
+ private:
+  Eigen::Array2f across(const Eigen::Vector3f& p) const { return {right_.dot(p), up_.dot(p)}; }
+  /// Points lie inside the plane's extent, as all are points of the surface that it was made from.
+  std::size_t index(const Eigen::Vector3f& p) const {
+    const Eigen::Array2i c = ((across(p) - origin_) / cell_).cast<int>();
+    const std::size_t i = static_cast<std::size_t>(std::max(0, c[1])) * width_ + std::clamp(c[0], 0, width_ - 1);
+    return std::min(i, nearest_.size() - 1);
+  }
+
+  Eigen::Vector3f towards_viewer_, right_, up_;
+  Eigen::Array2f origin_;
+  float cell_;
+  int width_;
+  std::vector<float> nearest_;
+};
+
+}  // namespace
+
+std::vector<ViewMask> visibility(std::span<const SurfacePoint> dense, std::span<const SurfacePoint> points,
+                                 std::span<const Eigen::Vector3f> viewpoints, double cell, const RunControl& control) {
+  const int words = static_cast<int>((viewpoints.size() + 63) / 64);
+  std::vector<ViewMask> masks(points.size(), ViewMask(words, 0));
+  // A word of 64 viewpoints is one thread's, so that no two write to the same place.
+  parallel_for(words, control.threads, [&](int word) {
+    const int last = std::min(static_cast<int>(viewpoints.size()), 64 * (word + 1));
+    for (int k = 64 * word; k < last && !control.interrupted(); ++k) {
+      const ProjectionPlane plane(dense, viewpoints[k], static_cast<float>(cell));
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        if (plane.cosine(points[i]) >= kGrazingCosine && plane.reaches(points[i])) {
+          masks[i][word] |= std::uint64_t{1} << (k % 64);
+        }
+      }
+    }
+  });
+  return masks;
+}
+
+double observability(const ViewMask& point, int view_count) {
+  int seen = 0;
+  for (const std::uint64_t word : point) seen += std::popcount(word);
+  return static_cast<double>(seen) / view_count;
+}
+
+double observability(const ViewMask& p, const ViewMask& q1, const ViewMask& q2, int view_count) {
+  int seen = 0;
+  for (std::size_t w = 0; w < p.size(); ++w) seen += std::popcount(p[w] & q1[w] & q2[w]);
+  return static_cast<double>(seen) / view_count;
+}
+
+std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const Eigen::Vector3f> viewpoints,
+                                   double cell) {
+  std::vector<int> votes(dense.size(), 0);
+  for (const Eigen::Vector3f& viewpoint : viewpoints) {
+    const ProjectionPlane plane(dense, viewpoint, static_cast<float>(cell));
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      const float cosine = plane.cosine(dense[i]);
+      // Where the surface is seen edge on, either side of a thin wall may win.
+      if (std::abs(cosine) > 0.5F && plane.reaches(dense[i])) votes[i] += cosine > 0 ? 1 : -1;
+    }
+  }
+  std::vector<bool> behind(dense.size());
+  for (std::size_t i = 0; i < dense.size(); ++i) behind[i] = votes[i] < 0;
+  return behind;
+}
+
+}  // namespace binpose
