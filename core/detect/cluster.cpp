@@ -51,7 +51,7 @@ struct RotationCoordinates {
   Eigen::Array3f rest;  // in cells
 
   explicit RotationCoordinates(const Eigen::Quaternionf& q) {
-    const Eigen::Vector4f c = q.coeffs();
+    const Eigen::Vector4f& c = q.coeffs();
     c.cwiseAbs().maxCoeff(&largest);
     const float sign = c[largest] < 0 ? -1.0F : 1.0F;
     for (int i = 0; i < 3; ++i) rest[i] = sign * c[(largest + 1 + i) & 3] / kRotationCell + 0.5F * kRotationCells;
@@ -157,8 +157,9 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
                       return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;
                     });
   std::vector<PoseCluster> merged;
-  for (std::size_t i = 0; i < seed_count; ++i)
+  for (std::size_t i = 0; i < seed_count; ++i) {
     merged.push_back(with_neighbours(cells, cells[seeds[i]], cell_of, options));
+  }
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });
 

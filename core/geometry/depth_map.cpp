@@ -97,7 +97,7 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
       continue;
     }
     view.points.push_back(p);
-    if (!cloud.normals.empty()) view.normals.push_back(R_view_scene * cloud.normals[i]);
+    if (!cloud.normals.empty()) view.normals.emplace_back(R_view_scene * cloud.normals[i]);
   }
   if (view.points.empty()) {
     return absl::InvalidArgumentError(
@@ -123,8 +123,8 @@ DepthMap depth_map(const SensorView& view, double pixel_size) {
   map.pixel_size = static_cast<float>(pixel_tan * view.median_depth);
   map.cx = -window.low_x * map.focal;
   map.cy = -window.low_y * map.focal;
-  map.width = static_cast<int>(width_tan / pixel_tan + 0.5) + 1;
-  map.height = static_cast<int>(height_tan / pixel_tan + 0.5) + 1;
+  map.width = static_cast<int>(std::lround(width_tan / pixel_tan)) + 1;
+  map.height = static_cast<int>(std::lround(height_tan / pixel_tan)) + 1;
   const std::size_t count = static_cast<std::size_t>(map.width) * map.height;
   map.points.assign(count, Eigen::Vector3f::Zero());
   map.normals.assign(count, Eigen::Vector3f::Zero());

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "absl/status/statusor.h"
