@@ -4,7 +4,7 @@
 set -eu
 
 packages="cmake g++ ninja-build
-  libabsl-dev libassimp-dev libcli11-dev libeigen3-dev libgrpc++-dev libprotobuf-dev libspdlog-dev libtbb-dev
+  libabsl-dev libassimp-dev libcli11-dev libeigen3-dev libgrpc++-dev libprotobuf-dev libspdlog-dev libssl-dev libtbb-dev
   prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
 case "${1:-}" in
   build) ;;
