@@ -7,8 +7,6 @@
 namespace binpose {
 namespace {
 
-constexpr double kDegree = 0.017453292519943295;
-
 /// INVALID_ARGUMENT unless `value` is a number in [low, high].
 absl::Status in_range(std::string_view field, double value, double low, double high) {
   if (value >= low && value <= high) return absl::OkStatus();

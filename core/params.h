@@ -8,6 +8,8 @@
 /// Every parameter of training and detection with its default, its unit and its range. A default is written here only.
 namespace binpose {
 
+constexpr double kDegree = 0.017453292519943295;  ///< radians
+
 /// How vector pairs are ranked before the best are kept.
 enum class PairSelection {
   kDistinctiveness,  ///< 1 - Ph [Eq. 4]: rare features first
@@ -29,8 +31,8 @@ struct TrainParams {
   double relative_sampling = 0.045;                                      ///< spacing of the pair points, [0.02, 0.1]
   std::vector<PairLengths> pair_lengths = {{0.30, 0.22}, {0.22, 0.12}};  ///< 1 to 4 of them
   double relative_length_tolerance = 0.02;                               ///< [0.001, 0.05]
-  double bin_width = 0.20943951023931953;  ///< of a feature angle, radians (12 deg), [4, 45] deg
-  int viewpoint_count = 500;               ///< K of [Eq. 5, 6], [16, 4096]
+  double bin_width = 12 * kDegree;                                       ///< of a feature angle, [4, 45] degrees
+  int viewpoint_count = 500;                                             ///< K of [Eq. 5, 6], [16, 4096]
   PairSelection selection = PairSelection::kSignalToNoise;
   double pairs_per_point = 3.0;         ///< N as a multiple of the model points, [0.001, 20]
   double observability_weight = 1.0;    ///< w1 of [Eq. 7], [0, 1000]
@@ -44,10 +46,10 @@ struct TrainParams {
 
 /// How a cloud is searched.
 struct DetectParams {
-  double min_score = 0.4;          ///< [0, 1]
-  int max_results = 100;           ///< [1, 1000]
-  double start_point_share = 0.2;  ///< share of the down-sampled points that pairs start from, [0.001, 1]
-  double normal_tolerance = 0.17453292519943295;  ///< gate on pair normals, radians (10 deg), [2, 45] deg
+  double min_score = 0.4;                  ///< [0, 1]
+  int max_results = 100;                   ///< [1, 1000]
+  double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
+  double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 45] degrees
   bool remove_support_plane = true;
 
   bool operator==(const DetectParams&) const = default;
