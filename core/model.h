@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/depth_map.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/view_sphere.h"
 #include "core/pair_table.h"
@@ -30,8 +31,9 @@ struct Model {
   double diameter = 0;  ///< largest distance between two vertices
   Eigen::Vector3d box_min = Eigen::Vector3d::Zero();
   Eigen::Vector3d box_max = Eigen::Vector3d::Zero();
-  std::vector<SurfacePoint> surface;  ///< evenly spaced, progressive: any prefix is evenly spread as well
-  std::vector<ViewMask> visibility;   ///< per surface point: the viewpoints that see it [Eq. 5]
+  std::vector<SurfacePoint> surface;                ///< evenly spaced, progressive: any prefix is evenly spread as well
+  std::vector<ViewMask> visibility;                 ///< per surface point: the viewpoints that see it [Eq. 5]
+  std::vector<std::vector<ContourPoint>> outlines;  ///< per viewpoint: where what it sees of the part ends
   std::vector<SurfacePoint> pair_points;
   std::vector<VectorPair> pairs;    ///< the selected pairs, best first; indices into `pair_points`
   std::vector<float> pair_weights;  ///< of a vote of each pair

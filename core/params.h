@@ -34,7 +34,7 @@ struct TrainParams {
   double bin_width = 12 * kDegree;                                       ///< of a feature angle, [4, 45] degrees
   int viewpoint_count = 500;                                             ///< K of [Eq. 5, 6], [16, 4096]
   PairSelection selection = PairSelection::kSignalToNoise;
-  double pairs_per_point = 3.0;         ///< N as a multiple of the model points, [0.001, 20]
+  double pairs_per_point = 6.0;         ///< N as a multiple of the model points, [0.001, 20]
   double observability_weight = 1.0;    ///< w1 of [Eq. 7], [0, 1000]
   double distinctiveness_weight = 1.0;  ///< w2 of [Eq. 7], [0, 1000]
 
@@ -46,7 +46,7 @@ struct TrainParams {
 
 /// How a cloud is searched.
 struct DetectParams {
-  double min_score = 0.4;                  ///< [0, 1]
+  double min_score = 0.2;                  ///< [0, 1]
   int max_results = 100;                   ///< [1, 1000]
   double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 45] degrees

@@ -10,6 +10,7 @@
 #include "core/detect/scene_points.h"
 #include "core/detect/verify.h"
 #include "core/detect/vote.h"
+#include "core/geometry/contours.h"
 #include "core/geometry/depth_map.h"
 #include "core/geometry/normals.h"
 #include "core/parallel.h"
@@ -27,12 +28,13 @@ constexpr float kCoarseTolerance = 0.04F;
 constexpr float kFinalTolerance = 0.012F;
 constexpr float kFirstGate = 0.08F;
 constexpr float kLastGate = 0.025F;
+constexpr float kContourStep = 0.03F;
 
 constexpr int kCoarsePoints = 80;
-constexpr int kClustersPerNeighbourhood = 30;
-constexpr int kMostClusters = 1500;
-constexpr int kRefinedPerNeighbourhood = 4;
-constexpr int kMostRefined = 200;
+constexpr int kClustersPerNeighbourhood = 120;
+constexpr int kMostClusters = 8000;
+constexpr int kRefinedPerNeighbourhood = 12;
+constexpr int kMostRefined = 800;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -148,6 +150,7 @@ DepthMap prepare(const SensorView& view, const Model& model, const RunControl& c
   const StageTimer timer(stats.preprocess_seconds);
   DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing));
   if (view.normals.empty()) estimate_normals(map, 1, control.threads);
+  find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control.threads);
   return map;
 }
 

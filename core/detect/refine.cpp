@@ -14,19 +14,34 @@ constexpr float kNormalCosine = 0.7F;
 constexpr int kFewestCorrespondences = 12;
 /// Weight of staying put, relative to the mean curvature: holds directions that the planes leave free.
 constexpr double kDamping = 1e-3;
+constexpr float kOutwardCosine = 0.7F;
+constexpr float kOutlineWeight = 1.0F;
 
-/// Normal equations of one Gauss-Newton step; unknowns: small rotation about `pivot`, then translation.
+/// Normal equations of one Gauss-Newton step; unknowns: small rotation about the pivot, then translation.
 struct NormalEquations {
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-  int correspondences = 0;
+  float A[6][6] = {};  // lower triangle
+  float b[6] = {};
+  int rows = 0;
+
+  /// Draws the point at `arm` from the pivot by `distance` along the unit vector `direction`; `gate` is where the pull
+  /// of Tukey's biweight ends.
+  void add(const Eigen::Vector3f& arm, const Eigen::Vector3f& direction, float distance, float gate, float weight) {
+    const float relative = distance / gate;
+    weight *= (1 - relative * relative) * (1 - relative * relative);
+    const Eigen::Vector3f turned = arm.cross(direction);
+    const float row[6] = {turned[0], turned[1], turned[2], direction[0], direction[1], direction[2]};
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c <= r; ++c) A[r][c] += weight * row[r] * row[c];
+      b[r] += weight * distance * row[r];
+    }
+    ++rows;
+  }
 };
 
-NormalEquations linearise(const DepthMap& map, const Model& model, std::span<const std::uint16_t> points,
-                          const Eigen::Isometry3f& T_view_model, const Eigen::Vector3f& pivot, float gate) {
-  Eigen::Matrix<float, 6, 6> A = Eigen::Matrix<float, 6, 6>::Zero();
-  Eigen::Matrix<float, 6, 1> b = Eigen::Matrix<float, 6, 1>::Zero();
-  NormalEquations equations;
+/// Draws each surface point to the plane of the pixel that it falls on.
+void add_surface(const DepthMap& map, const Model& model, std::span<const std::uint16_t> points,
+                 const Eigen::Isometry3f& T_view_model, const Eigen::Vector3f& pivot, float gate,
+                 NormalEquations& equations) {
   for (const std::uint16_t index : points) {
     const SurfacePoint& point = model.surface[index];
     const Eigen::Vector3f p = T_view_model * point.position;
@@ -39,19 +54,53 @@ NormalEquations linearise(const DepthMap& map, const Model& model, std::span<con
         normal.dot(T_view_model.linear() * point.normal) < kNormalCosine) {
       continue;
     }
-    const float relative = distance / gate;
-    const float weight = (1 - relative * relative) * (1 - relative * relative);  // Tukey's biweight
-    const Eigen::Vector3f turned = (p - pivot).cross(normal);
-    const float row[6] = {turned[0], turned[1], turned[2], normal[0], normal[1], normal[2]};
-    for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c <= r; ++c) A(r, c) += weight * row[r] * row[c];
-      b(r) += weight * distance * row[r];
-    }
-    ++equations.correspondences;
+    equations.add(p - pivot, normal, distance, gate, 1);
   }
-  equations.A = Eigen::Matrix<float, 6, 6>(A.selfadjointView<Eigen::Lower>()).cast<double>();
-  equations.b = b.cast<double>();
-  return equations;
+}
+
+/// The scene's contour nearest to an outline point along its outward direction, or null.
+const ContourPoint* matching_contour(const DepthMap& map, const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
+                                     const Eigen::Vector3f& outward, float gate) {
+  const int reach = std::max(1, static_cast<int>(gate / map.pixel_size));
+  for (int k = 0; k <= 2 * reach; ++k) {
+    const int step = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
+    const Eigen::Vector3f q = p + static_cast<float>(step) * map.pixel_size * outward;
+    const int pixel = q.z() > 0 ? map.pixel_of(q) : -1;
+    if (pixel < 0 || map.contour_at[pixel] < 0) continue;
+    const ContourPoint& contour = map.contours[map.contour_at[pixel]];
+    if (contour.outward.dot(outward) > kOutwardCosine && std::abs(normal.dot(contour.position - p)) < gate)
+      return &contour;
+  }
+  return nullptr;
+}
+
+/// Draws each outline point to where the scene's surface ends. Planes leave a flat part free to slide; its rim does
+/// not.
+void add_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
+                 const Eigen::Vector3f& pivot, float gate, float weight, NormalEquations& equations) {
+  for (const ContourPoint& point : outline) {
+    const Eigen::Vector3f p = T_view_model * point.position;
+    if (!(p.z() > 0)) continue;
+    const Eigen::Vector3f outward = T_view_model.linear() * point.outward;
+    const ContourPoint* contour = matching_contour(map, p, T_view_model.linear() * point.normal, outward, gate);
+    if (contour == nullptr) continue;
+    const float distance = outward.dot(contour->position - p);
+    if (std::abs(distance) < gate) equations.add(p - pivot, outward, distance, gate, weight);
+  }
+}
+
+/// The step that solves the equations, damped; rotations are damped as what they do at the part's radius.
+Eigen::Matrix<float, 6, 1> solve(const NormalEquations& equations, float radius) {
+  Eigen::Matrix<double, 6, 6> A;
+  Eigen::Matrix<double, 6, 1> b;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c <= r; ++c) A(r, c) = A(c, r) = equations.A[r][c];
+    b[r] = equations.b[r];
+  }
+  const double damping = kDamping * A.diagonal().tail<3>().sum() / 3;
+  A.diagonal().head<3>().array() += damping * radius * radius;
+  A.diagonal().tail<3>().array() += damping;
+  return A.ldlt().solve(b).cast<float>();
 }
 
 }  // namespace
@@ -60,7 +109,8 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
                          const RefineOptions& options) {
   Eigen::Isometry3f T = T_view_model;
   const auto radius = static_cast<float>(0.5 * model.diameter);
-  const std::vector<std::uint16_t>& visible = visible_points(model, T);
+  const int viewpoint = nearest_viewpoint(model, T);
+  const std::vector<std::uint16_t>& visible = model.visible_from[viewpoint];
   const std::span<const std::uint16_t> points(
       visible.data(), std::min<std::size_t>(visible.size(), static_cast<std::size_t>(options.most_points)));
   for (int i = 0; i < options.iterations; ++i) {
@@ -68,13 +118,11 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
         options.iterations > 1 ? static_cast<float>(i) / static_cast<float>(options.iterations - 1) : 1;
     const float gate = options.first_gate * std::pow(options.last_gate / options.first_gate, progress);
     const Eigen::Vector3f pivot = T * model.centre.cast<float>();
-    NormalEquations equations = linearise(map, model, points, T, pivot, gate);
-    if (equations.correspondences < kFewestCorrespondences) break;
-    // Rotations are damped as what they do at the part's radius.
-    const double damping = kDamping * equations.A.diagonal().tail<3>().sum() / 3;
-    equations.A.diagonal().head<3>().array() += damping * radius * radius;
-    equations.A.diagonal().tail<3>().array() += damping;
-    const Eigen::Matrix<float, 6, 1> step = equations.A.ldlt().solve(equations.b).cast<float>();
+    NormalEquations equations;
+    add_surface(map, model, points, T, pivot, gate, equations);
+    add_outline(map, model.outlines[viewpoint], T, pivot, gate, kOutlineWeight, equations);
+    if (equations.rows < kFewestCorrespondences) break;
+    const Eigen::Matrix<float, 6, 1> step = solve(equations, radius);
     if (!step.allFinite()) break;
     const float angle = step.head<3>().norm();
     Eigen::Isometry3f move = Eigen::Isometry3f::Identity();

@@ -8,20 +8,67 @@ namespace {
 
 /// What a point in free space takes away, against what an explained one adds.
 constexpr float kViolationPenalty = 1.0F;
+/// Outline points, as a share, that are taken for granted on either side: what an outline that is hidden counts.
+constexpr float kOutlinePrior = 0.02F;
+/// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
+constexpr float kOutside = 2.0F;
+constexpr float kInside = 1.0F;
+
+/// How far the scene lies behind the surface of an outline point, carried on a little along `outward`; metres, NaN
+/// where nothing was measured. At a rounded side the tangent plane runs along the ray: it is carried on at most at
+/// `steepest`.
+float depth_behind(const DepthMap& map, const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
+                   const Eigen::Vector3f& outward, float distance, float steepest) {
+  const Eigen::Vector3f q = p + distance * outward;
+  const int pixel = q.z() > 0 ? map.pixel_of(q) : -1;
+  if (pixel < 0 || !map.measured(pixel)) return NAN;
+  const float slope = std::clamp(normal.dot(outward) / std::max(-normal.z(), 0.05F), -steepest, steepest);
+  return (map.points[pixel].z() - p.z() - slope * distance) / std::sqrt(1 + slope * slope);
+}
+
+/// Whether the scene's surface ends where the model's does.
+void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
+                   const VerifyOptions& options, Evidence& evidence) {
+  int confirmed = 0, contradicted = 0;
+  for (const ContourPoint& contour : outline) {
+    const Eigen::Vector3f p = T_view_model * contour.position;
+    const Eigen::Vector3f normal = T_view_model.linear() * contour.normal;
+    const Eigen::Vector3f outward = T_view_model.linear() * contour.outward;
+    const float inside = depth_behind(map, p, normal, outward, -kInside * map.pixel_size, 5);
+    if (inside < -options.tolerance) continue;  // hidden
+    const float outside = depth_behind(map, p, normal, outward, kOutside * map.pixel_size, 1);
+    if (inside > options.tolerance) {
+      ++contradicted;
+    } else if (outside > options.tolerance) {
+      ++confirmed;
+    } else if (outside >= -options.tolerance) {
+      ++contradicted;
+    }
+  }
+  const float scale = 1.0F / static_cast<float>(std::max<std::size_t>(1, outline.size()));
+  evidence.outline_confirmed = scale * static_cast<float>(confirmed);
+  evidence.outline_contradicted = scale * static_cast<float>(contradicted);
+}
 
 }  // namespace
 
-float Evidence::score() const { return std::clamp(explained - kViolationPenalty * violated, 0.0F, 1.0F); }
+float Evidence::score() const {
+  const float surface = explained - kViolationPenalty * violated;
+  const float outline =
+      (outline_confirmed + kOutlinePrior) / (outline_confirmed + outline_contradicted + 2 * kOutlinePrior);
+  return std::clamp(surface * outline, 0.0F, 1.0F);
+}
 
-const std::vector<std::uint16_t>& visible_points(const Model& model, const Eigen::Isometry3f& T_view_model) {
+int nearest_viewpoint(const Model& model, const Eigen::Isometry3f& T_view_model) {
   const Eigen::Vector3f centre = T_view_model * model.centre.cast<float>();
   const Eigen::Vector3f towards_viewer = T_view_model.linear().transpose() * -centre;
-  return model.visible_from[nearest_view(model.viewpoints, towards_viewer)];
+  return nearest_view(model.viewpoints, towards_viewer);
 }
 
 Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
                 const VerifyOptions& options, const std::vector<std::uint8_t>* owned) {
-  const std::vector<std::uint16_t>& visible = visible_points(model, T_view_model);
+  const int viewpoint = nearest_viewpoint(model, T_view_model);
+  const std::vector<std::uint16_t>& visible = model.visible_from[viewpoint];
   const int count = std::min(options.most_points, static_cast<int>(visible.size()));
   int explained = 0, violated = 0, occluded = 0, unexplained = 0;
   float sum_sq = 0;
@@ -59,6 +106,7 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
   evidence.occluded = scale * static_cast<float>(occluded);
   evidence.unexplained = scale * static_cast<float>(unexplained);
   evidence.residual = explained > 0 ? std::sqrt(sum_sq / static_cast<float>(explained)) : 0;
+  check_outline(map, model.outlines[viewpoint], T_view_model, options, evidence);
   return evidence;
 }
 

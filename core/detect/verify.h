@@ -16,18 +16,25 @@ struct VerifyOptions {
 
 /// What the sensor saw of the surface that a pose says it should see. Shares of all points visible from that side.
 struct Evidence {
-  float explained = 0;    ///< measured where the model is
-  float violated = 0;     ///< measured clearly behind: the sensor looked through the model
-  float occluded = 0;     ///< measured clearly in front: something hides the model
-  float unexplained = 0;  ///< measured near, with another normal
-  float residual = 0;     ///< root mean square distance of the explained points, metres
+  float explained = 0;             ///< measured where the model is
+  float violated = 0;              ///< measured clearly behind: the sensor looked through the model
+  float occluded = 0;              ///< measured clearly in front: something hides the model
+  float unexplained = 0;           ///< measured near, with another normal
+  float outline_confirmed = 0;     ///< of the outline points: the surface is there and ends there
+  float outline_contradicted = 0;  ///< of the outline points: the surface goes on, or is missing
+  float residual = 0;              ///< root mean square distance of the explained points, metres
 
   /// Explained share less what the scene contradicts, in [0, 1].
   float score() const;
 };
 
+/// The viewpoint of training nearest to a viewer at the origin.
+int nearest_viewpoint(const Model& model, const Eigen::Isometry3f& T_view_model);
+
 /// The points of the model that a viewer at the origin sees of it, as a list into Model::surface.
-const std::vector<std::uint16_t>& visible_points(const Model& model, const Eigen::Isometry3f& T_view_model);
+inline const std::vector<std::uint16_t>& visible_points(const Model& model, const Eigen::Isometry3f& T_view_model) {
+  return model.visible_from[nearest_viewpoint(model, T_view_model)];
+}
 
 /// Compares the visible surface of a pose with the depth map, point by point.
 ///

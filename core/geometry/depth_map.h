@@ -10,6 +10,13 @@
 
 namespace binpose {
 
+/// A point where a surface ends in front of something deeper: an outline, the rim of a hole, the edge of a step.
+struct ContourPoint {
+  Eigen::Vector3f position;
+  Eigen::Vector3f normal;   ///< of the surface that ends
+  Eigen::Vector3f outward;  ///< unit, across the view, away from the surface
+};
+
 /// A cloud as the sensor saw it: the nearest point of each cell of a pinhole image. The structure that normals,
 /// verification, refinement and suppression all read.
 ///
@@ -23,6 +30,9 @@ struct DepthMap {
   std::vector<Eigen::Vector3f> points;   ///< row by row, view frame; z = 0: nothing measured
   std::vector<Eigen::Vector3f> normals;  ///< unit, towards the sensor; zero: none
   std::vector<std::uint8_t> background;  ///< 1: belongs to the support plane
+
+  std::vector<ContourPoint> contours;  ///< see contours.h
+  std::vector<int> contour_at;         ///< per pixel: index into `contours`, or -1
 
   bool measured(int i) const { return points[i].z() > 0; }
   bool has_normal(int i) const { return normals[i].z() != 0; }

@@ -106,6 +106,16 @@ void visit(Archive& archive, std::vector<SurfacePoint>& points) {
 }
 
 template <typename Archive>
+void visit(Archive& archive, std::vector<ContourPoint>& contours) {
+  archive.length(contours);
+  for (ContourPoint& contour : contours) {
+    visit(archive, contour.position);
+    visit(archive, contour.normal);
+    visit(archive, contour.outward);
+  }
+}
+
+template <typename Archive>
 void visit(Archive& archive, TrainParams& params) {
   archive.number(params.relative_sampling);
   archive.length(params.pair_lengths);
@@ -148,6 +158,8 @@ void visit(Archive& archive, Model& model) {
     mask.resize(words);
     for (std::uint64_t& word : mask) archive.number(word);
   }
+  archive.length(model.outlines);
+  for (std::vector<ContourPoint>& outline : model.outlines) visit(archive, outline);
   visit(archive, model.pair_points);
   archive.length(model.pairs);
   for (VectorPair& pair : model.pairs) archive.number(pair);
@@ -170,6 +182,14 @@ bool sound(const std::vector<SurfacePoint>& points) {
          });
 }
 
+bool sound(const std::vector<std::vector<ContourPoint>>& outlines) {
+  return std::all_of(outlines.begin(), outlines.end(), [](const std::vector<ContourPoint>& outline) {
+    return std::all_of(outline.begin(), outline.end(), [](const ContourPoint& c) {
+      return c.position.allFinite() && c.normal.allFinite() && c.outward.allFinite();
+    });
+  });
+}
+
 /// What derive() and detection rely on.
 bool invariants_hold(const Model& model) {
   const std::size_t points = model.pair_points.size(), scales = model.params.pair_lengths.size();
@@ -177,6 +197,7 @@ bool invariants_hold(const Model& model) {
          model.params.selection <= PairSelection::kSignalToNoise && model.diameter > 0 &&
          std::isfinite(model.diameter) && model.box_min.allFinite() && model.box_max.allFinite() &&
          sound(model.surface) && sound(model.pair_points) && model.visibility.size() == model.surface.size() &&
+         model.outlines.size() == static_cast<std::size_t>(model.params.viewpoint_count) && sound(model.outlines) &&
          model.pair_weights.size() == model.pairs.size() && !model.symmetry.discrete.empty() &&
          std::all_of(model.pair_weights.begin(), model.pair_weights.end(),
                      [](float weight) { return std::isfinite(weight) && weight >= 0; }) &&

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/train/mesh_extent.h"
+#include "core/train/outlines.h"
 #include "core/train/sample_surface.h"
 #include "core/train/select.h"
 #include "core/train/vector_pairs.h"
@@ -16,6 +17,8 @@ constexpr double kRelativeSurfaceSpacing = 0.03;
 /// Spacing of the points that stand for the whole surface in projections.
 constexpr double kRelativeDenseSpacing = 0.007;
 constexpr double kRelativeCell = 0.02;
+constexpr double kRelativePixel = 0.014;
+constexpr double kRelativeStep = 0.03;
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
 /// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
@@ -78,6 +81,9 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   model.visibility = visibility(dense, model.surface, viewpoints, kRelativeCell * model.diameter, control);
   const std::vector<ViewMask> pair_masks =
       visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
+
+  model.outlines = outlines(dense, viewpoints, model.diameter, kRelativePixel * model.diameter,
+                            kRelativeStep * model.diameter, control);
 
   const int scales = static_cast<int>(params.pair_lengths.size());
   const auto pairs_per_scale = static_cast<std::size_t>(

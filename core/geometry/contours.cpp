@@ -1,0 +1,56 @@
+#include "core/geometry/contours.h"
+
+#include <Eigen/Geometry>
+
+#include "core/parallel.h"
+
+namespace binpose {
+namespace {
+
+constexpr int kWidestGap = 5;  // pixels that may lack a measurement between an edge and what lies behind it
+constexpr int kDirections[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+
+/// Whether the surface at a pixel ends in a direction.
+bool ends(const DepthMap& map, int u, int v, const int (&direction)[2], float step, Unmeasured unmeasured) {
+  const int i = v * map.width + u;
+  for (int k = 1; k <= kWidestGap; ++k) {
+    const int column = u + k * direction[0], row = v + k * direction[1];
+    if (column < 0 || row < 0 || column >= map.width || row >= map.height) break;
+    const int j = row * map.width + column;
+    if (map.measured(j))
+      return map.normals[i].dot(map.points[j] - map.points[i]) < -step && map.points[j].z() > map.points[i].z();
+  }
+  return unmeasured == Unmeasured::kFar;
+}
+
+/// Where the surface at a pixel ends: the mean of the directions in which it does, zero if it goes on.
+Eigen::Vector2f outward_at(const DepthMap& map, int u, int v, float step, Unmeasured unmeasured) {
+  Eigen::Vector2f outward = Eigen::Vector2f::Zero();
+  for (const auto& direction : kDirections) {
+    if (ends(map, u, v, direction, step, unmeasured)) {
+      outward += Eigen::Vector2f(static_cast<float>(direction[0]), static_cast<float>(direction[1])).normalized();
+    }
+  }
+  // A sum near zero belongs to a speck or a thread, which has no side.
+  return outward.squaredNorm() < 0.5F ? Eigen::Vector2f::Zero() : Eigen::Vector2f(outward.normalized());
+}
+
+}  // namespace
+
+void find_contours(DepthMap& map, float step, Unmeasured unmeasured, int threads) {
+  std::vector<Eigen::Vector2f> outward(map.points.size(), Eigen::Vector2f::Zero());
+  parallel_for(map.height, threads, [&](int v) {
+    for (int u = 0; u < map.width; ++u) {
+      if (map.has_normal(v * map.width + u)) outward[v * map.width + u] = outward_at(map, u, v, step, unmeasured);
+    }
+  });
+  map.contours.clear();
+  map.contour_at.assign(map.points.size(), -1);
+  for (std::size_t i = 0; i < outward.size(); ++i) {
+    if (outward[i] == Eigen::Vector2f::Zero()) continue;
+    map.contour_at[i] = static_cast<int>(map.contours.size());
+    map.contours.push_back({map.points[i], map.normals[i], {outward[i].x(), outward[i].y(), 0}});
+  }
+}
+
+}  // namespace binpose
