@@ -21,6 +21,8 @@ void derive(Model& model) {
   }
   model.pair_table = PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
                                static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin);
+  model.contour_table = ContourTable(model.contour_points, model.contour_pairs, model.contour_weights,
+                                     static_cast<float>(model.diameter));
 }
 
 }  // namespace binpose

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/contour_pair.h"
 #include "core/geometry/depth_map.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/view_sphere.h"
@@ -35,8 +36,11 @@ struct Model {
   std::vector<ViewMask> visibility;                 ///< per surface point: the viewpoints that see it [Eq. 5]
   std::vector<std::vector<ContourPoint>> outlines;  ///< per viewpoint: where what it sees of the part ends
   std::vector<SurfacePoint> pair_points;
-  std::vector<VectorPair> pairs;    ///< the selected pairs, best first; indices into `pair_points`
-  std::vector<float> pair_weights;  ///< of a vote of each pair
+  std::vector<VectorPair> pairs;             ///< the selected pairs, best first; indices into `pair_points`
+  std::vector<float> pair_weights;           ///< of a vote of each pair
+  std::vector<ContourPoint> contour_points;  ///< outward directions in the tangent plane
+  std::vector<ContourPair> contour_pairs;    ///< the selected ones, best first; indices into `contour_points`
+  std::vector<float> contour_weights;        ///< of a vote of each contour pair
   Symmetry symmetry;
   std::vector<std::string> warnings;  ///< what is odd about the mesh, one sentence each
 
@@ -45,6 +49,7 @@ struct Model {
   std::vector<Eigen::Vector3f> viewpoints;               ///< unit directions from the part to the viewer
   std::vector<std::vector<std::uint16_t>> visible_from;  ///< per viewpoint: the surface points seen, in their order
   PairTable pair_table;
+  ContourTable contour_table;
 };
 
 /// Fills the derived members from the stored ones.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/detect/cluster.h"
+#include "core/detect/contour_votes.h"
 #include "core/detect/rank.h"
 #include "core/detect/refine.h"
 #include "core/detect/scene_points.h"
@@ -85,21 +86,21 @@ std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, con
   return kept;
 }
 
-/// Votes, clusters and coarse verification: where the model may be.
-std::vector<Candidate> find_candidates(const DepthMap& map, const Model& model, int model_index,
-                                       const DetectParams& params, const RunControl& control, DetectStats& stats) {
+Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
+                    DetectStats& stats) {
+  const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * model.diameter / map.pixel_size)));
+  const ScenePoints scene = down_sample(map, block);
+  const std::vector<int> starts = start_points(scene, params.start_point_share);
+  stats.start_point_count += starts.size();
+  return vote(scene, starts, map, model, params, control);
+}
+
+/// Clusters of votes that stand a coarse verification: where the model may be, best first.
+std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, const Model& model, int model_index,
+                                       const RunControl& control, DetectStats& stats) {
   const auto diameter = static_cast<float>(model.diameter);
-  Votes votes;
-  {
-    const StageTimer timer(stats.vote_seconds);
-    const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * diameter / map.pixel_size)));
-    const ScenePoints scene = down_sample(map, block);
-    const std::vector<int> starts = start_points(scene, params.start_point_share);
-    votes = vote(scene, starts, map, model, params, control);
-    stats.start_point_count += starts.size();
-    stats.scene_pair_count += votes.scene_pairs;
-    stats.vote_count += votes.votes.size();
-  }
+  stats.scene_pair_count += votes.scene_pairs;
+  stats.vote_count += votes.votes.size();
   std::vector<Candidate> candidates;
   {
     const StageTimer timer(stats.cluster_seconds);
@@ -120,6 +121,21 @@ std::vector<Candidate> find_candidates(const DepthMap& map, const Model& model, 
   coarse.most_points = kCoarsePoints;
   verify_all(map, model, coarse, control, candidates);
   return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
+}
+
+/// Candidates of both sources. Each has a list of its own, so that contours need not outvote surfaces or be outvoted.
+std::vector<Candidate> find_all_candidates(const DepthMap& map, const Model& model, int model_index,
+                                           const DetectParams& params, const RunControl& control, DetectStats& stats) {
+  Votes by_surface, by_contour;
+  {
+    const StageTimer timer(stats.vote_seconds);
+    by_surface = surface_votes(map, model, params, control, stats);
+    by_contour = contour_votes(map, model, control);
+  }
+  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, control, stats);
+  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, control, stats);
+  candidates.insert(candidates.end(), more.begin(), more.end());
+  return candidates;
 }
 
 VerifyOptions final_verification(const Model& model) {
@@ -186,7 +202,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     if (control.stop.stop_requested()) return control.status();
     const Model& model = *models[m];
     DepthMap map = prepare(*view, model, control, result.stats);
-    std::vector<Candidate> found = find_candidates(map, model, static_cast<int>(m), params, control, result.stats);
+    std::vector<Candidate> found = find_all_candidates(map, model, static_cast<int>(m), params, control, result.stats);
     refine_all(map, model, control, found, result.stats);
     candidates.insert(candidates.end(), found.begin(), found.end());
     final_options.push_back(final_verification(model));

@@ -135,6 +135,18 @@ class PairMatcher {
 
 }  // namespace
 
+Votes concatenate(std::span<const Votes> parts) {
+  Votes all;
+  std::size_t count = 0;
+  for (const Votes& part : parts) count += part.votes.size();
+  all.votes.reserve(count);
+  for (const Votes& part : parts) {
+    all.votes.insert(all.votes.end(), part.votes.begin(), part.votes.end());
+    all.scene_pairs += part.scene_pairs;
+  }
+  return all;
+}
+
 Votes vote(const ScenePoints& scene, std::span<const int> starts, const DepthMap& map, const Model& model,
            const DetectParams& params, const RunControl& control) {
   const int tasks = (static_cast<int>(starts.size()) + kStartsPerTask - 1) / kStartsPerTask;
@@ -145,15 +157,7 @@ Votes vote(const ScenePoints& scene, std::span<const int> starts, const DepthMap
     const std::size_t last = std::min<std::size_t>(starts.size(), (task + 1) * kStartsPerTask);
     for (std::size_t i = task * kStartsPerTask; i < last; ++i) matcher.match(starts[i], parts[task]);
   });
-  Votes all;
-  std::size_t count = 0;
-  for (const Votes& part : parts) count += part.votes.size();
-  all.votes.reserve(count);
-  for (const Votes& part : parts) {
-    all.votes.insert(all.votes.end(), part.votes.begin(), part.votes.end());
-    all.scene_pairs += part.scene_pairs;
-  }
-  return all;
+  return concatenate(parts);
 }
 
 }  // namespace binpose

@@ -25,6 +25,9 @@ struct Votes {
   std::uint64_t scene_pairs = 0;  ///< vector pairs looked up
 };
 
+/// The votes of several parts of a scene, in their order.
+Votes concatenate(std::span<const Votes> parts);
+
 /// Matches the scene's vector pairs with the model's [paper, section IV 2 and 3].
 ///
 /// From each start point all pairs of the model's lengths and right angle are formed and looked up; a model pair whose

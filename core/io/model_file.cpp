@@ -165,6 +165,11 @@ void visit(Archive& archive, Model& model) {
   for (VectorPair& pair : model.pairs) archive.number(pair);
   archive.length(model.pair_weights);
   for (float& weight : model.pair_weights) archive.number(weight);
+  visit(archive, model.contour_points);
+  archive.length(model.contour_pairs);
+  for (ContourPair& pair : model.contour_pairs) archive.number(pair);
+  archive.length(model.contour_weights);
+  for (float& weight : model.contour_weights) archive.number(weight);
   visit(archive, model.symmetry);
   archive.length(model.warnings);
   for (std::string& warning : model.warnings) visit(archive, warning);
@@ -182,12 +187,15 @@ bool sound(const std::vector<SurfacePoint>& points) {
          });
 }
 
-bool sound(const std::vector<std::vector<ContourPoint>>& outlines) {
-  return std::all_of(outlines.begin(), outlines.end(), [](const std::vector<ContourPoint>& outline) {
-    return std::all_of(outline.begin(), outline.end(), [](const ContourPoint& c) {
-      return c.position.allFinite() && c.normal.allFinite() && c.outward.allFinite();
-    });
+bool sound(const std::vector<ContourPoint>& contours) {
+  return std::all_of(contours.begin(), contours.end(), [](const ContourPoint& c) {
+    return c.position.allFinite() && c.normal.allFinite() && c.outward.allFinite();
   });
+}
+
+bool sound(const std::vector<std::vector<ContourPoint>>& outlines) {
+  return std::all_of(outlines.begin(), outlines.end(),
+                     [](const std::vector<ContourPoint>& outline) { return sound(outline); });
 }
 
 /// What derive() and detection rely on.
@@ -198,6 +206,13 @@ bool invariants_hold(const Model& model) {
          std::isfinite(model.diameter) && model.box_min.allFinite() && model.box_max.allFinite() &&
          sound(model.surface) && sound(model.pair_points) && model.visibility.size() == model.surface.size() &&
          model.outlines.size() == static_cast<std::size_t>(model.params.viewpoint_count) && sound(model.outlines) &&
+         sound(model.contour_points) && model.contour_points.size() <= 65535 &&
+         model.contour_weights.size() == model.contour_pairs.size() &&
+         std::all_of(model.contour_pairs.begin(), model.contour_pairs.end(),
+                     [&](const ContourPair& pair) {
+                       return pair.a < model.contour_points.size() && pair.b < model.contour_points.size() &&
+                              pair.a != pair.b;
+                     }) &&
          model.pair_weights.size() == model.pairs.size() && !model.symmetry.discrete.empty() &&
          std::all_of(model.pair_weights.begin(), model.pair_weights.end(),
                      [](float weight) { return std::isfinite(weight) && weight >= 0; }) &&

@@ -22,16 +22,6 @@ Eigen::Isometry3f view_frame(const Eigen::Vector3f& viewpoint, float distance, c
   return T_view_model;
 }
 
-/// Evenly taken `most` entries of a list.
-std::vector<ContourPoint> thinned(const std::vector<ContourPoint>& all, std::size_t most) {
-  if (all.size() <= most) return all;
-  std::vector<ContourPoint> kept;
-  for (std::size_t i = 0; i < most; ++i) kept.push_back(all[i * all.size() / most]);
-  return kept;
-}
-
-constexpr std::size_t kMostPerView = 48;
-
 }  // namespace
 
 std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> dense,
@@ -57,7 +47,7 @@ std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> de
     }
     DepthMap map = depth_map(view, pixel);
     find_contours(map, static_cast<float>(step), Unmeasured::kFar, 1);
-    views[k] = thinned(map.contours, kMostPerView);
+    views[k] = std::move(map.contours);
     const Eigen::Isometry3f T_model_view = T_view_model.inverse();
     for (ContourPoint& contour : views[k]) {
       contour = {T_model_view * contour.position, T_model_view.linear() * contour.normal,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/train/contour_pairs.h"
 #include "core/train/mesh_extent.h"
 #include "core/train/outlines.h"
 #include "core/train/sample_surface.h"
@@ -19,6 +20,9 @@ constexpr double kRelativeDenseSpacing = 0.007;
 constexpr double kRelativeCell = 0.02;
 constexpr double kRelativePixel = 0.014;
 constexpr double kRelativeStep = 0.03;
+constexpr double kRelativeContourCell = 0.03;
+constexpr std::size_t kContourPairs = 3000;
+constexpr std::size_t kOutlinePoints = 48;  // per view, for verification
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
 /// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
@@ -31,6 +35,14 @@ std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter) {
     if (behind[i]) dense[i].normal = -dense[i].normal;
   }
   return dense;
+}
+
+/// `most` entries of a list, or all.
+std::vector<ContourPoint> evenly_taken(const std::vector<ContourPoint>& all, std::size_t most) {
+  std::vector<ContourPoint> kept;
+  const std::size_t count = std::min(most, all.size());
+  for (std::size_t i = 0; i < count; ++i) kept.push_back(all[i * all.size() / count]);
+  return kept;
 }
 
 /// Pairs of one scale, selected [Eq. 2-7], appended to the model.
@@ -82,8 +94,15 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   const std::vector<ViewMask> pair_masks =
       visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
 
-  model.outlines = outlines(dense, viewpoints, model.diameter, kRelativePixel * model.diameter,
-                            kRelativeStep * model.diameter, control);
+  std::vector<std::vector<ContourPoint>> views = outlines(
+      dense, viewpoints, model.diameter, kRelativePixel * model.diameter, kRelativeStep * model.diameter, control);
+  const std::vector<PooledContour> contours = pool_contours(views, kRelativeContourCell * model.diameter);
+  for (const PooledContour& contour : contours) model.contour_points.push_back(contour.point);
+  RatedContourPairs rated =
+      select_contour_pairs(contours, model.diameter, kContourPairs, params.viewpoint_count, control);
+  model.contour_pairs = std::move(rated.pairs);
+  model.contour_weights = std::move(rated.weights);
+  for (const std::vector<ContourPoint>& view : views) model.outlines.push_back(evenly_taken(view, kOutlinePoints));
 
   const int scales = static_cast<int>(params.pair_lengths.size());
   const auto pairs_per_scale = static_cast<std::size_t>(

@@ -1,0 +1,79 @@
+#include "core/contour_pair.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace binpose {
+namespace {
+
+constexpr float kSameNormalCosine = 0.9659258F;  // 15 degrees
+constexpr float kTwoPi = 2 * std::numbers::pi_v<float>;
+
+}  // namespace
+
+std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPoint& b, float shortest, float longest,
+                                          float flatness) {
+  const Eigen::Vector3f line = b.position - a.position;
+  const float distance = line.norm();
+  if (distance < shortest || distance > longest || a.normal.dot(b.normal) < kSameNormalCosine ||
+      std::abs(a.normal.dot(line)) > flatness || std::abs(b.normal.dot(line)) > flatness) {
+    return std::nullopt;
+  }
+  Eigen::Matrix3f axes;
+  axes.col(0) = line / distance;
+  const Eigen::Vector3f normal = a.normal + b.normal;
+  axes.col(2) = (normal - axes.col(0) * axes.col(0).dot(normal)).normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  ContourFrame frame;
+  frame.T_outer_pair.linear() = axes;
+  frame.T_outer_pair.translation() = a.position;
+  frame.T_outer_pair.makeAffine();
+  frame.feature = {distance, std::atan2(axes.col(1).dot(a.outward), axes.col(0).dot(a.outward)),
+                   std::atan2(axes.col(1).dot(b.outward), axes.col(0).dot(b.outward))};
+  return frame;
+}
+
+int ContourTable::distance_bin(float distance) const {
+  const float share = (distance / diameter_ - kShortestContourPair) / (kLongestContourPair - kShortestContourPair);
+  return std::clamp(static_cast<int>(share * kDistanceBins), 0, kDistanceBins - 1);
+}
+
+int ContourTable::angle_bin(float angle) {
+  const int bin = static_cast<int>(std::floor((angle + kTwoPi) / kTwoPi * kAngleBins));
+  return bin % kAngleBins;
+}
+
+ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs,
+                           std::span<const float> weights, float diameter)
+    : diameter_(diameter), distance_tolerance_(kRelativeDistanceTolerance * diameter) {
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (const auto& [a, b] : {std::pair(pairs[i].a, pairs[i].b), std::pair(pairs[i].b, pairs[i].a)}) {
+      const std::optional<ContourFrame> frame = contour_frame(points[a], points[b], 0, 2 * diameter, diameter);
+      if (frame) entries_.push_back({frame->feature, frame->T_outer_pair.inverse(), weights[i]});
+    }
+  }
+  std::vector<std::vector<std::uint32_t>> slots(slot_of(kDistanceBins - 1, kAngleBins - 1, kAngleBins - 1) + 1);
+  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+    const ContourFeature& f = entries_[i].feature;
+    const int low = distance_bin(f.distance - distance_tolerance_),
+              high = distance_bin(f.distance + distance_tolerance_);
+    // The angles' tolerance is a bin's width: the neighbours on either side hold all that may match.
+    for (int d = low; d <= high; ++d) {
+      for (int a = -1; a <= 1; ++a) {
+        for (int b = -1; b <= 1; ++b) {
+          slots[slot_of(d, (angle_bin(f.angle_a) + a + kAngleBins) % kAngleBins,
+                        (angle_bin(f.angle_b) + b + kAngleBins) % kAngleBins)]
+              .push_back(i);
+        }
+      }
+    }
+  }
+  first_.push_back(0);
+  for (const std::vector<std::uint32_t>& slot : slots) {
+    index_.insert(index_.end(), slot.begin(), slot.end());
+    first_.push_back(static_cast<std::uint32_t>(index_.size()));
+  }
+}
+
+}  // namespace binpose

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/geometry/depth_map.h"
+
+namespace binpose {
+
+/// Two contour points of one plane, as indices into a list. They give a whole pose where a flat face gives none.
+struct ContourPair {
+  std::uint16_t a, b;
+};
+
+/// What two coplanar contour points look like: their distance and how each outward direction lies to the line from a to
+/// b, radians in [-pi, pi], counted about the common normal.
+struct ContourFeature {
+  float distance;
+  float angle_a, angle_b;
+};
+
+/// A pair seen as a frame: x from a to b, z along the common normal, origin in a.
+struct ContourFrame {
+  Eigen::Isometry3f T_outer_pair;
+  ContourFeature feature;
+};
+
+/// The frame and feature of two contour points; none when their normals differ by more than 15 degrees, when one lies
+/// more than `flatness` off the other's plane, or when their distance is outside [shortest, longest]. Metres.
+std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPoint& b, float shortest, float longest,
+                                          float flatness);
+
+/// Lengths of contour pairs, as shares of the diameter.
+inline constexpr float kShortestContourPair = 0.2F;
+inline constexpr float kLongestContourPair = 0.7F;
+inline constexpr float kContourFlatness = 0.025F;
+
+/// Look-up from feature to the model's contour pairs. Scene pairs may come in either order of their points.
+class ContourTable {
+ public:
+  struct Entry {
+    ContourFeature feature;
+    Eigen::Isometry3f T_pair_model;
+    float weight;
+  };
+
+  ContourTable() = default;
+  ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs, std::span<const float> weights,
+               float diameter);
+
+  /// Calls `use(entry)` for each pair whose distance and angles agree with the feature within the tolerances below.
+  template <typename Use>
+  void for_each_match(const ContourFeature& feature, Use&& use) const {
+    if (first_.empty()) return;
+    const std::size_t slot =
+        slot_of(distance_bin(feature.distance), angle_bin(feature.angle_a), angle_bin(feature.angle_b));
+    for (std::uint32_t i = first_[slot]; i < first_[slot + 1]; ++i) {
+      const Entry& entry = entries_[index_[i]];
+      if (std::abs(entry.feature.distance - feature.distance) <= distance_tolerance_ &&
+          turn(entry.feature.angle_a, feature.angle_a) <= kAngleTolerance &&
+          turn(entry.feature.angle_b, feature.angle_b) <= kAngleTolerance) {
+        use(entry);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kDistanceBins = 32;
+  static constexpr int kAngleBins = 24;
+  static constexpr float kAngleTolerance = 0.2617994F;         // 15 degrees, the width of a bin
+  static constexpr float kRelativeDistanceTolerance = 0.018F;  // of the diameter
+
+  /// Smallest turn between two angles.
+  static float turn(float a, float b) {
+    const float d = std::abs(a - b);
+    return d > 3.14159265F ? 6.2831853F - d : d;
+  }
+  int distance_bin(float distance) const;
+  static int angle_bin(float angle);
+  static std::size_t slot_of(int distance, int a, int b) {
+    return (static_cast<std::size_t>(distance) * kAngleBins + a) * kAngleBins + b;
+  }
+
+  float diameter_ = 1, distance_tolerance_ = 0;
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> first_, index_;  // per slot: its entries
+};
+
+}  // namespace binpose
