@@ -4,8 +4,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "tests/scenes/box_mesh.h"
 
 namespace binpose::scenes {
 namespace {
@@ -25,26 +26,6 @@ double hull_area(const Mesh& part) {
     }
   }
   return twice / 2;
-}
-
-void add_box(Mesh& mesh, const Eigen::AlignedBox3d& box) {
-  constexpr std::array<std::array<std::uint32_t, 3>, 12> kFaces{{{0, 2, 1},
-                                                                 {1, 2, 3},
-                                                                 {4, 5, 6},
-                                                                 {5, 7, 6},
-                                                                 {0, 1, 4},
-                                                                 {1, 5, 4},
-                                                                 {2, 6, 3},
-                                                                 {3, 6, 7},
-                                                                 {0, 4, 2},
-                                                                 {2, 4, 6},
-                                                                 {1, 3, 5},
-                                                                 {3, 7, 5}}};
-  const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
-  for (int i = 0; i < 8; ++i) {  // bit 0 = x, bit 1 = y, bit 2 = z
-    mesh.vertices.push_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)).cast<float>());
-  }
-  for (const auto& face : kFaces) mesh.triangles.push_back({base + face[0], base + face[1], base + face[2]});
 }
 
 }  // namespace

@@ -96,7 +96,8 @@ void measure(Cell& cell, const RayScene& solid) {
   }
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3d corner = cell.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
-    if (solid.inside(corner)) points.push_back(corner);
+    const Eigen::Vector3d just_within = corner + 1e-4 * (cell.box.center() - corner);  // corners may lie on a face
+    if (solid.inside(just_within)) points.push_back(corner);
   }
   if (points.size() >= 4) cell.hull = hull_of(points);
   if (!cell.hull) return;
