@@ -119,8 +119,35 @@ PoseCluster mean(const Cell& cell) {
   return {cell.centre / cell.weight, Eigen::Quaternionf(Eigen::Vector4f(cell.quaternion.normalized())), cell.weight};
 }
 
+/// Finds cells by key.
+class CellIndex {
+ public:
+  explicit CellIndex(const std::vector<Cell>& cells)
+      : cells_(cells), slots_(std::bit_ceil(2 * cells.size()), kEmpty), shift_(64 - std::countr_zero(slots_.size())) {
+    for (std::uint32_t i = 0; i < cells.size(); ++i) {
+      std::size_t slot = first_slot(cells[i].key);
+      while (slots_[slot] != kEmpty) slot = (slot + 1) & (slots_.size() - 1);
+      slots_[slot] = i;
+    }
+  }
+  const Cell* find(std::uint64_t key) const {
+    for (std::size_t slot = first_slot(key); slots_[slot] != kEmpty; slot = (slot + 1) & (slots_.size() - 1)) {
+      if (cells_[slots_[slot]].key == key) return &cells_[slots_[slot]];
+    }
+    return nullptr;
+  }
+
+ private:
+  static constexpr std::uint32_t kEmpty = 0xFFFFFFFF;
+  std::size_t first_slot(std::uint64_t key) const { return key * 0x9E3779B97F4A7C15ULL >> shift_; }
+
+  const std::vector<Cell>& cells_;
+  std::vector<std::uint32_t> slots_;
+  int shift_;
+};
+
 /// A cell with those of the 64 cells around its mean (8 of centre, 8 of rotation) that agree with it.
-PoseCluster with_neighbours(const std::vector<Cell>& cells, const Cell& seed, const CellOf& cell_of,
+PoseCluster with_neighbours(const CellIndex& index, const Cell& seed, const CellOf& cell_of,
                             const ClusterOptions& options) {
   const PoseCluster own = mean(seed);
   const RotationCoordinates rotation(own.q_view_model);
@@ -132,9 +159,8 @@ PoseCluster with_neighbours(const std::vector<Cell>& cells, const Cell& seed, co
     const Eigen::Array3i turn = low_rotation + Eigen::Array3i(i >> 3 & 1, i >> 4 & 1, i >> 5 & 1);
     const std::uint64_t key = cell_of.key(cell, rotation.largest, turn);
     if (key == seed.key) continue;
-    const auto found = std::lower_bound(cells.begin(), cells.end(), key,
-                                        [](const Cell& c, std::uint64_t wanted) { return c.key < wanted; });
-    if (found == cells.end() || found->key != key) continue;
+    const Cell* found = index.find(key);
+    if (found == nullptr) continue;
     const PoseCluster other = mean(*found);
     if (!same_pose(own, other, options.radius, std::cos(0.5F * options.angle))) continue;
     add(sum, other.votes, other.centre, other.q_view_model.coeffs());
@@ -151,14 +177,15 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
 
   std::vector<std::uint32_t> seeds(cells.size());
   std::iota(seeds.begin(), seeds.end(), 0);
-  const std::size_t seed_count = std::min<std::size_t>(seeds.size(), 4 * static_cast<std::size_t>(options.most));
+  const std::size_t seed_count = std::min<std::size_t>(seeds.size(), 3 * static_cast<std::size_t>(options.most));
   std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(seed_count), seeds.end(),
                     [&](std::uint32_t a, std::uint32_t b) {
                       return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;
                     });
+  const CellIndex index(cells);
   std::vector<PoseCluster> merged;
   for (std::size_t i = 0; i < seed_count; ++i) {
-    merged.push_back(with_neighbours(cells, cells[seeds[i]], cell_of, options));
+    merged.push_back(with_neighbours(index, cells[seeds[i]], cell_of, options));
   }
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });

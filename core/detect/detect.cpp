@@ -26,16 +26,23 @@ constexpr double kRelativeBlock = 0.042;
 constexpr float kClusterRadius = 0.06F;
 constexpr float kNeighbourhood = 0.25F;
 constexpr float kCoarseTolerance = 0.04F;
-constexpr float kFinalTolerance = 0.012F;
+constexpr float kFinalTolerance = 0.006F;
+constexpr float kNoiseTolerance = 2.5F;
 constexpr float kFirstGate = 0.08F;
 constexpr float kLastGate = 0.025F;
 constexpr float kContourStep = 0.03F;
 
 constexpr int kCoarsePoints = 80;
-constexpr int kClustersPerNeighbourhood = 120;
-constexpr int kMostClusters = 8000;
-constexpr int kRefinedPerNeighbourhood = 12;
-constexpr int kMostRefined = 800;
+constexpr int kClustersPerNeighbourhood = 20;
+constexpr int kMostClusters = 1000;
+constexpr int kRefinedPerNeighbourhood = 4;
+constexpr int kMostRefined = 200;
+constexpr int kMiddlePoints = 300;
+constexpr int kFinalistsPerNeighbourhood = 6;
+constexpr int kMostFinalists = 150;
+constexpr float kFinestGate = 0.015F;
+constexpr int kFinestIterations = 3;
+constexpr int kFinestPoints = 400;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -138,28 +145,45 @@ std::vector<Candidate> find_all_candidates(const DepthMap& map, const Model& mod
   return candidates;
 }
 
-VerifyOptions final_verification(const Model& model) {
+VerifyOptions final_verification(const DepthMap& map, const Model& model) {
   VerifyOptions options;
-  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter);
+  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
   return options;
 }
 
-/// Refines each candidate and keeps the better of before and after.
-void refine_all(const DepthMap& map, const Model& model, const RunControl& control, std::vector<Candidate>& candidates,
+/// Refines each candidate and judges it anew.
+void refine_all(const DepthMap& map, const Model& model, const RefineOptions& refinement,
+                const VerifyOptions& verification, const RunControl& control, std::vector<Candidate>& candidates,
                 DetectStats& stats) {
   {
     const StageTimer timer(stats.refine_seconds);
-    RefineOptions options;
-    options.first_gate = kFirstGate * static_cast<float>(model.diameter);
-    options.last_gate = kLastGate * static_cast<float>(model.diameter);
     parallel_for(static_cast<int>(candidates.size()), control.threads, [&](int i) {
       if (control.interrupted()) return;
-      candidates[i].T_view_model = refine(map, model, candidates[i].T_view_model, options);
+      candidates[i].T_view_model = refine(map, model, candidates[i].T_view_model, refinement);
     });
   }
   const StageTimer timer(stats.verify_seconds);
-  verify_all(map, model, final_verification(model), control, candidates);
+  verify_all(map, model, verification, control, candidates);
   stats.verified_count += candidates.size();
+}
+
+/// Refinement from the accuracy of votes to that of the sensor: all candidates with few points, the best with many.
+std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model, std::vector<Candidate> candidates,
+                                         const RunControl& control, DetectStats& stats) {
+  const auto diameter = static_cast<float>(model.diameter);
+  RefineOptions refinement;
+  refinement.first_gate = kFirstGate * diameter;
+  refinement.last_gate = kLastGate * diameter;
+  VerifyOptions verification = final_verification(map, model);
+  verification.most_points = kMiddlePoints;
+  refine_all(map, model, refinement, verification, control, candidates, stats);
+  candidates = best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists);
+  refinement.first_gate = kLastGate * diameter;
+  refinement.last_gate = kFinestGate * diameter;
+  refinement.iterations = kFinestIterations;
+  refinement.most_points = kFinestPoints;
+  refine_all(map, model, refinement, final_verification(map, model), control, candidates, stats);
+  return candidates;
 }
 
 DepthMap prepare(const SensorView& view, const Model& model, const RunControl& control, DetectStats& stats) {
@@ -203,9 +227,9 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     const Model& model = *models[m];
     DepthMap map = prepare(*view, model, control, result.stats);
     std::vector<Candidate> found = find_all_candidates(map, model, static_cast<int>(m), params, control, result.stats);
-    refine_all(map, model, control, found, result.stats);
+    found = refine_to_the_end(map, model, std::move(found), control, result.stats);
     candidates.insert(candidates.end(), found.begin(), found.end());
-    final_options.push_back(final_verification(model));
+    final_options.push_back(final_verification(map, model));
     if (m == 0 || map.pixel_size < finest.pixel_size) finest = std::move(map);
   }
   if (control.stop.stop_requested()) return control.status();

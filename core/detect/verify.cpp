@@ -10,6 +10,8 @@ namespace {
 constexpr float kViolationPenalty = 1.0F;
 /// Outline points, as a share, that are taken for granted on either side: what an outline that is hidden counts.
 constexpr float kOutlinePrior = 0.02F;
+/// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
+constexpr float kSteepest = 0.25882F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
 constexpr float kOutside = 2.0F;
 constexpr float kInside = 1.0F;
@@ -53,7 +55,8 @@ void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline
 }  // namespace
 
 float Evidence::score() const {
-  const float surface = explained - kViolationPenalty * violated;
+  // What is hidden half excuses itself.
+  const float surface = (explained - kViolationPenalty * violated) / (1 - 0.5F * occluded);
   const float outline =
       (outline_confirmed + kOutlinePrior) / (outline_confirmed + outline_contradicted + 2 * kOutlinePrior);
   return std::clamp(surface * outline, 0.0F, 1.0F);
@@ -70,15 +73,18 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
   const int viewpoint = nearest_viewpoint(model, T_view_model);
   const std::vector<std::uint16_t>& visible = model.visible_from[viewpoint];
   const int count = std::min(options.most_points, static_cast<int>(visible.size()));
-  int explained = 0, violated = 0, occluded = 0, unexplained = 0;
-  float sum_sq = 0;
+  Evidence evidence;
+  float total = 0, sum_sq = 0;
   for (int i = 0; i < count; ++i) {
     const SurfacePoint& point = model.surface[visible[i]];
     const Eigen::Vector3f p = T_view_model * point.position;
     if (!(p.z() > 0)) continue;
+    const Eigen::Vector3f normal = T_view_model.linear() * point.normal;
+    const float weight = -normal.dot(p) / p.norm();
+    if (weight < kSteepest) continue;
+    total += weight;
     const int pixel = map.pixel_of(p);
     if (pixel < 0 || !map.measured(pixel)) continue;
-    const Eigen::Vector3f normal = T_view_model.linear() * point.normal;
     const float distance = normal.dot(map.points[pixel] - p);
     const float depth_step = map.points[pixel].z() - p.z();
     const bool taken = owned != nullptr && (*owned)[pixel] != 0;
@@ -86,26 +92,23 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
     const float slack = options.tolerance + 1.5F * map.pixel_size;
     if (std::abs(distance) <= options.tolerance && std::abs(depth_step) < 3 * slack) {
       if (!taken && map.has_normal(pixel) && normal.dot(map.normals[pixel]) >= options.normal_cosine) {
-        ++explained;
-        sum_sq += distance * distance;
+        evidence.explained += weight;
+        sum_sq += weight * distance * distance;
       } else {
-        ++unexplained;
+        evidence.unexplained += weight;
       }
     } else if (depth_step > slack) {
-      ++violated;
+      evidence.violated += weight;
     } else if (depth_step < -slack) {
-      ++occluded;
+      evidence.occluded += weight;
     } else {
-      ++unexplained;
+      evidence.unexplained += weight;
     }
   }
-  Evidence evidence;
-  const float scale = 1.0F / static_cast<float>(std::max(1, count));
-  evidence.explained = scale * static_cast<float>(explained);
-  evidence.violated = scale * static_cast<float>(violated);
-  evidence.occluded = scale * static_cast<float>(occluded);
-  evidence.unexplained = scale * static_cast<float>(unexplained);
-  evidence.residual = explained > 0 ? std::sqrt(sum_sq / static_cast<float>(explained)) : 0;
+  evidence.residual = evidence.explained > 0 ? std::sqrt(sum_sq / evidence.explained) : 0;
+  const float scale = 1 / std::max(total, 1e-6F);
+  for (float* share : {&evidence.explained, &evidence.violated, &evidence.occluded, &evidence.unexplained})
+    *share *= scale;
   check_outline(map, model.outlines[viewpoint], T_view_model, options, evidence);
   return evidence;
 }

@@ -6,7 +6,7 @@ namespace binpose {
 
 /// Sets the normal of every measured pixel that has enough neighbours: the plane through its window, fitted as inverse
 /// depth over the image, where every plane is linear. Neighbours across a depth step are left out; pixels seen under
-/// more than 80 degrees get no normal.
+/// more than 80 degrees get no normal. Also sets the map's noise, from the windows that are most nearly plane.
 ///
 /// @param radius  of the window, pixels: 1 = 3 x 3.
 /// Deterministic on any number of threads.
