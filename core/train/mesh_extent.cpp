@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kSmallestDiameter = 1e-4;
 constexpr double kLargestDiameter = 100;
+/// Area over the square of the diameter, below which there is nothing to sample: a wire 3000 times as long as thick.
+constexpr double kLeastRelativeArea = 1e-3;
 /// Directions in which the outermost vertices are compared; about 6 degrees apart, which misses at most
 /// 1 - cos(3 degrees) = 0.14 % of the diameter.
 constexpr int kExtremeDirections = 1000;
@@ -40,9 +42,12 @@ absl::Status check_mesh(const Mesh& mesh) {
         absl::StrFormat("mesh has a diameter of %g m; it must lie in [%g, %g] m. Check the unit.", extent.diameter,
                         kSmallestDiameter, kLargestDiameter));
   }
-  if (!(extent.area > 1e-9 * extent.diameter * extent.diameter)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("mesh has a surface area of %g square metres; every triangle is degenerate.", extent.area));
+  const double least_area = kLeastRelativeArea * extent.diameter * extent.diameter;
+  if (!(extent.area >= least_area)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "mesh has a surface area of %g square metres; for its diameter of %g m it must be at least %g. Its triangles "
+        "are degenerate, or a stray one lies far off.",
+        extent.area, extent.diameter, least_area));
   }
   return absl::OkStatus();
 }
