@@ -1,0 +1,152 @@
+#include "core/geometry/depth_map.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tests/scenes/random.h"
+#include "tests/support/ray_cast.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+using Eigen::Vector3f;
+using ::testing::HasSubstr;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+PointCloud unordered(std::vector<Vector3f> points) {
+  PointCloud cloud;
+  cloud.width = static_cast<std::uint32_t>(points.size());
+  cloud.height = 1;
+  cloud.points = std::move(points);
+  return cloud;
+}
+
+PointCloud block_over_floor() {
+  Pose T_scene_part = Pose::Identity();
+  T_scene_part.translation() = Eigen::Vector3d(-0.02, -0.03, 0.46);
+  const testing::PlacedMesh bodies[] = {{testing::l_block(), T_scene_part}};
+  testing::PinholeSensor sensor;
+  sensor.width = 160;
+  sensor.height = 120;
+  sensor.focal = 300;
+  return testing::render(bodies, sensor);
+}
+
+TEST(SensorView, MapsBackOntoTheCloud) {
+  PointCloud cloud = block_over_floor();
+  cloud.sensor_position = Eigen::Vector3d(0.05, -0.02, 0.01);
+  const absl::StatusOr<SensorView> view = sensor_view(cloud);
+  ASSERT_TRUE(view.ok());
+  ASSERT_EQ(view->points.size(), cloud.points.size());
+  EXPECT_TRUE((view->T_scene_view * Eigen::Vector3d::Zero()).isApprox(cloud.sensor_position));
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const Eigen::Vector3d back = view->T_scene_view * view->points[i].cast<double>();
+    ASSERT_LT((back - cloud.points[i].cast<double>()).norm(), 1e-6);
+  }
+}
+
+TEST(SensorView, MeasuresTheSpacingOfAGrid) {
+  testing::PinholeSensor sensor;
+  sensor.focal = 300;
+  const absl::StatusOr<SensorView> view = sensor_view(testing::render({}, sensor));
+  ASSERT_TRUE(view.ok());
+  EXPECT_NEAR(view->median_depth, 0.5, 1e-4);
+  EXPECT_NEAR(view->spacing, 0.5 / 300, 0.1 * 0.5 / 300);
+}
+
+TEST(SensorView, LeavesOutWhatWasNotMeasuredOrLiesBehindTheSensor) {
+  const absl::StatusOr<SensorView> view = sensor_view(
+      unordered({{0, 0, 0.5F}, {kNan, 0, 0.5F}, {0, 0, INFINITY}, {0, 0, -0.5F}, {0.01F, 0, 0.5F}, {0, 0.01F, 0.6F}}));
+  ASSERT_TRUE(view.ok());
+  EXPECT_EQ(view->points.size(), 3u);
+}
+
+struct Refused {
+  const char* what;
+  PointCloud cloud;
+  const char* says;
+};
+
+TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
+  PointCloud wrong_size = unordered({{0, 0, 1}, {0, 0, 2}});
+  wrong_size.height = 2;
+  PointCloud huge_size = unordered({{0, 0, 1}});
+  huge_size.width = huge_size.height = 0xFFFFFFFF;
+  PointCloud lost_sensor = unordered({{0, 0, 1}});
+  lost_sensor.sensor_position.x() = kNan;
+  PointCloud few_normals = unordered({{0, 0, 1}, {0, 0, 2}});
+  few_normals.normals = {{0, 0, -1}};
+  const Refused cases[] = {
+      {"size", wrong_size, "2 points; width x height is 2 x 2 = 4"},
+      {"huge size", huge_size, "1 points; width x height is"},
+      {"empty", unordered({}), "0 points"},
+      {"no measurement", unordered({{kNan, kNan, kNan}, {INFINITY, 0, 1}}), "no measurement among its 2 points"},
+      {"all in the sensor", unordered({{0, 0, 0}, {0, 0, 0}}), "no measurement among its 2 points"},
+      {"sensor position", lost_sensor, "sensor_position"},
+      {"normals", few_normals, "1 normals for 2 points"},
+  };
+  for (const Refused& refused : cases) {
+    const absl::StatusOr<SensorView> view = sensor_view(refused.cloud);
+    ASSERT_EQ(view.status().code(), absl::StatusCode::kInvalidArgument) << refused.what;
+    EXPECT_THAT(std::string(view.status().message()), HasSubstr(refused.says)) << refused.what;
+  }
+}
+
+TEST(DepthMap, HoldsTheNearestPointOfEachPixel) {
+  const SensorView view = *sensor_view(block_over_floor());
+  const DepthMap map = depth_map(view, 0.004);  // several points a pixel
+  std::vector<float> nearest(map.points.size(), 0);
+  for (const Vector3f& p : view.points) {
+    const int u = static_cast<int>(std::floor(map.focal * p.x() / p.z() + map.cx + 0.5F));
+    const int v = static_cast<int>(std::floor(map.focal * p.y() / p.z() + map.cy + 0.5F));
+    ASSERT_TRUE(u >= 0 && v >= 0 && u < map.width && v < map.height) << "every point has a pixel";
+    float& z = nearest[static_cast<std::size_t>(v) * map.width + u];
+    z = z == 0 ? p.z() : std::min(z, p.z());
+  }
+  for (std::size_t i = 0; i < nearest.size(); ++i) ASSERT_EQ(map.points[i].z(), nearest[i]) << i;
+}
+
+TEST(DepthMap, HasPixelsOfTheWantedSize) {
+  const SensorView view = *sensor_view(block_over_floor());
+  const DepthMap map = depth_map(view, 0.004);
+  EXPECT_NEAR(map.pixel_size, 0.004, 1e-6);
+  EXPECT_NEAR(view.median_depth / map.focal, 0.004, 1e-6);
+}
+
+TEST(DepthMap, OfPointsFarApartStaysSmall) {
+  for (const float reach : {1e3F, 1e30F}) {
+    const SensorView view = *sensor_view(unordered(
+        {{0, 0, 1e-3F}, {2e-3F, 0, 1e-3F}, {0, 2e-3F, 1e-3F}, {reach, 0, reach}, {0, reach, reach}, {0, 0, reach}}));
+    const DepthMap map = depth_map(view, 0.001);
+    EXPECT_LE(map.points.size(), 4'500'000u) << reach;
+    EXPECT_EQ(map.points.size(), static_cast<std::size_t>(map.width) * map.height);
+  }
+}
+
+TEST(DepthMap, KeepsGivenNormalsTurnedToTheSensorAndDropsSpoiltOnes) {
+  PointCloud cloud = unordered({{-0.1F, 0, 1}, {0, 0, 1}, {0.1F, 0, 1}});
+  cloud.normals = {{0, 0, -1}, {0, 0, 2}, {kNan, 0, 1}};
+  const SensorView view = *sensor_view(cloud);
+  const DepthMap map = depth_map(view, 0.05);
+  const auto normal_at = [&](int i) { return map.normals[map.pixel_of(view.points[i])]; };
+  EXPECT_TRUE(normal_at(0).isApprox(Vector3f(0, 0, -1), 1e-5F));
+  EXPECT_TRUE(normal_at(1).isApprox(Vector3f(0, 0, -1), 1e-5F));
+  EXPECT_EQ(normal_at(2), Vector3f::Zero());
+}
+
+TEST(DepthMap, PixelOfIsMinusOneOutside) {
+  const DepthMap map = depth_map(*sensor_view(block_over_floor()), 0.004);
+  EXPECT_EQ(map.pixel_of({10, 0, 0.5F}), -1);
+  EXPECT_EQ(map.pixel_of({-10, 0, 0.5F}), -1);
+  EXPECT_EQ(map.pixel_of({0, 10, 0.5F}), -1);
+  EXPECT_EQ(map.pixel_of({kNan, 0, 0.5F}), -1);
+}
+
+}  // namespace
+}  // namespace binpose

@@ -1,0 +1,156 @@
+#include "core/geometry/normals.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/params.h"
+#include "tests/support/ray_cast.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr double kPixel = 0.002;
+
+/// The bodies from above, with normals of a 3 x 3 window.
+DepthMap map_of(std::span<const testing::PlacedMesh> bodies, std::optional<double> floor_depth, double noise = 0) {
+  testing::PinholeSensor sensor;
+  sensor.width = 150;
+  sensor.height = 112;
+  sensor.focal = 1.25 * 0.5 / kPixel;  // more than a point per pixel
+  sensor.floor_depth = floor_depth;
+  sensor.noise = noise;
+  DepthMap map = depth_map(*sensor_view(testing::render(bodies, sensor)), kPixel);
+  estimate_normals(map, 1, 1);
+  return map;
+}
+
+testing::PlacedMesh placed(Mesh mesh, const Eigen::Vector3d& at, double tilt_degrees = 0) {
+  Pose T_scene_mesh(Eigen::AngleAxisd(tilt_degrees * kDegree, Eigen::Vector3d(1, 2, 0).normalized()));
+  T_scene_mesh.pretranslate(at);
+  return {std::move(mesh), T_scene_mesh};
+}
+
+double angle_degrees(const Vector3f& a, const Vector3f& b) {
+  return std::acos(std::clamp(static_cast<double>(a.dot(b)), -1.0, 1.0)) / kDegree;
+}
+
+TEST(Normals, OfATiltedPlaneAreExact) {
+  for (const double tilt : {0.0, 20.0, 45.0, 60.0}) {
+    const testing::PlacedMesh slab = placed(testing::box({2, 2, 0.02F}), {0, 0, 0.5}, tilt);
+    const DepthMap map = map_of({&slab, 1}, std::nullopt);
+    const Vector3f expected = map.T_scene_view.linear().transpose().cast<float>() *
+                              slab.T_scene_mesh.linear().cast<float>() * Vector3f(0, 0, -1);
+    int count = 0;
+    for (std::size_t i = 0; i < map.points.size(); ++i) {
+      if (!map.has_normal(static_cast<int>(i))) continue;
+      ++count;
+      ASSERT_LT(angle_degrees(map.normals[i], expected), 0.3) << "tilt " << tilt;
+    }
+    EXPECT_GT(count, 0.6 * 120 * 90) << "tilt " << tilt;
+  }
+}
+
+TEST(Normals, OfASpherePointFromItsCentre) {
+  const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
+  const DepthMap map = map_of({&ball, 1}, std::nullopt);
+  const Vector3f centre = (map.T_scene_view.inverse() * Eigen::Vector3d(0, 0, 0.5)).cast<float>();
+  int count = 0;
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    if (!map.has_normal(static_cast<int>(i))) continue;
+    const Vector3f radial = (map.points[i] - centre).normalized();
+    // Facets are 7.5 degrees wide; near the side, where the window is cut off, the fit leans inwards.
+    if (radial.z() > -0.5F) continue;
+    ++count;
+    EXPECT_LT(angle_degrees(map.normals[i], radial), 6);
+  }
+  EXPECT_GT(count, 1000);
+}
+
+/// Normal of the plane of least squares through the window's points, if they are many and nearby.
+Vector3f pca_normal(const DepthMap& map, int u, int v) {
+  std::vector<Vector3f> window;
+  const Vector3f centre = map.points[v * map.width + u];
+  for (int row = v - 1; row <= v + 1; ++row) {
+    for (int column = u - 1; column <= u + 1; ++column) {
+      const Vector3f& p = map.points[row * map.width + column];
+      if (p.z() > 0 && std::abs(p.z() - centre.z()) < 2 * static_cast<float>(kPixel)) window.push_back(p);
+    }
+  }
+  if (window.size() < 9) return Vector3f::Zero();
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Vector3f& p : window) mean += p.cast<double>() / 9;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Vector3f& p : window) {
+    covariance += (p.cast<double>() - mean) * (p.cast<double>() - mean).transpose();
+  }
+  const Vector3f normal =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors().col(0).cast<float>();
+  return normal.dot(centre) > 0 ? Vector3f(-normal) : normal;
+}
+
+TEST(Normals, AgreeWithPrincipalAxesOnNoisySurfaces) {
+  const testing::PlacedMesh bodies[] = {placed(testing::sphere(0.05F), {0, 0, 0.5}),
+                                        placed(testing::box({0.06F, 0.08F, 0.04F}), {0.07, 0.01, 0.5}, 25)};
+  const DepthMap map = map_of(bodies, 0.55, 5e-5);
+  int compared = 0, far = 0;
+  double sum = 0;
+  for (int v = 1; v + 1 < map.height; ++v) {
+    for (int u = 1; u + 1 < map.width; ++u) {
+      const Vector3f expected = pca_normal(map, u, v);
+      const Vector3f& normal = map.normals[v * map.width + u];
+      if (expected.isZero() || expected.z() > -0.7F || normal.isZero()) continue;
+      ++compared;
+      sum += angle_degrees(normal, expected);
+      far += static_cast<int>(angle_degrees(normal, expected) > 4);
+    }
+  }
+  EXPECT_LT(sum / compared, 0.5);
+  EXPECT_LT(far, 0.01 * compared) << "at the edges, where the two limits of a window differ";
+  EXPECT_GT(compared, 4000);
+}
+
+TEST(Normals, DoNotMixTheTwoSidesOfADepthStep) {
+  const testing::PlacedMesh block = placed(testing::box({0.08F, 0.08F, 0.05F}), {0, 0, 0.47});
+  const DepthMap map = map_of({&block, 1}, 0.495);
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    if (!map.has_normal(static_cast<int>(i))) continue;
+    const Vector3f normal = map.T_scene_view.linear().cast<float>() * map.normals[i];
+    EXPECT_LT(angle_degrees(normal, {0, 0, -1}), 0.5);
+  }
+}
+
+TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
+  const testing::PlacedMesh steep = placed(testing::box({2, 2, 0.001F}), {0, 0, 0.5}, 84);
+  const DepthMap map = map_of({&steep, 1}, std::nullopt);
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    if (map.has_normal(static_cast<int>(i))) {
+      EXPECT_GE(-map.normals[i].dot(map.points[i].normalized()), std::cos(80.1 * kDegree));
+    }
+  }
+  PointCloud lonely;
+  lonely.points = {{0, 0, 0.5F}, {0.1F, 0, 0.5F}, {0, 0.1F, 0.5F}};
+  lonely.width = 3;
+  lonely.height = 1;
+  DepthMap sparse = depth_map(*sensor_view(lonely), kPixel);
+  estimate_normals(sparse, 1, 1);
+  for (const Vector3f& normal : sparse.normals) EXPECT_TRUE(normal.isZero());
+}
+
+TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
+  const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
+  const DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
+  for (const int threads : {2, 4}) {
+    DepthMap many = one;
+    estimate_normals(many, 1, threads);
+    EXPECT_EQ(many.normals, one.normals);
+  }
+}
+
+}  // namespace
+}  // namespace binpose

@@ -1,0 +1,32 @@
+#include "tests/support/scan_map.h"
+
+#include "core/geometry/contours.h"
+#include "core/geometry/normals.h"
+#include "core/train/train.h"
+
+namespace binpose::testing {
+
+Model quick_model(const Mesh& mesh) {
+  TrainParams params;
+  params.viewpoint_count = 200;
+  return train(mesh, params, {}).value();
+}
+
+DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
+  DepthMap map = depth_map(sensor_view(render(bodies, sensor)).value(), 0.014 * diameter);
+  estimate_normals(map, 1, 1);
+  find_contours(map, static_cast<float>(0.03 * diameter), Unmeasured::kUnknown, 1);
+  return map;
+}
+
+Eigen::Isometry3f in_view(const DepthMap& map, const Pose& T_scene_model) {
+  return Eigen::Isometry3f((map.T_scene_view.inverse() * T_scene_model).matrix().cast<float>());
+}
+
+Pose pose(double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& translation) {
+  Pose T(Eigen::AngleAxisd(degrees * kDegree, axis.normalized()));
+  T.pretranslate(translation);
+  return T;
+}
+
+}  // namespace binpose::testing

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <span>
+
+#include "core/geometry/depth_map.h"
+#include "core/model.h"
+#include "tests/support/ray_cast.h"
+
+namespace binpose::testing {
+
+/// A model trained from few viewpoints, as tests have little time; the mesh must be a good one.
+Model quick_model(const Mesh& mesh);
+
+/// A scan as detection sees it when it looks for a part of the given diameter: pixels, normals, contours.
+DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter);
+
+/// A pose of the scene frame in the map's view frame.
+Eigen::Isometry3f in_view(const DepthMap& map, const Pose& T_scene_model);
+
+/// A turn by degrees about an axis, then a shift.
+Pose pose(double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& translation);
+
+}  // namespace binpose::testing
