@@ -15,7 +15,7 @@ inline void add_box(Mesh& mesh, const Eigen::AlignedBox3d& box) {
                                             {2, 6, 3},         {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
   for (int i = 0; i < 8; ++i) {  // bit 0 = x, bit 1 = y, bit 2 = z
-    mesh.vertices.push_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)).cast<float>());
+    mesh.vertices.emplace_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)).cast<float>());
   }
   for (const Triangle& face : kFaces) mesh.triangles.push_back({base + face[0], base + face[1], base + face[2]});
 }

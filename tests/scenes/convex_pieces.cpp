@@ -132,7 +132,7 @@ std::optional<Polygon> cut(const Polygon& polygon, const Eigen::Hyperplane<doubl
     if (height[i] < kOnPlane) kept.corners.push_back(polygon.corners[i]);
     if ((height[i] < -kOnPlane && height[j] > kOnPlane) || (height[i] > kOnPlane && height[j] < -kOnPlane)) {
       const double t = height[i] / (height[i] - height[j]);
-      kept.corners.push_back(polygon.corners[i] + t * (polygon.corners[j] - polygon.corners[i]));
+      kept.corners.emplace_back(polygon.corners[i] + t * (polygon.corners[j] - polygon.corners[i]));
     }
   }
   return kept.corners.size() >= 3 ? std::optional(kept) : std::nullopt;
@@ -178,7 +178,7 @@ std::vector<ConvexPiece> convex_pieces(const Mesh& mesh, double tolerance) {
   for (const auto& triangle : mesh.triangles) {
     Polygon polygon;
     for (const std::uint32_t i : triangle) {
-      polygon.corners.push_back(mesh.vertices[i].cast<double>());
+      polygon.corners.emplace_back(mesh.vertices[i].cast<double>());
       whole.box.extend(polygon.corners.back());
     }
     const auto& c = polygon.corners;

@@ -31,6 +31,7 @@ std::vector<btRigidBody*> hang_parts(RigidBodies& bodies, const Mesh& part, cons
   const int rows = std::max(1, static_cast<int>(bin.width / (2 * radius)));
   const Eigen::Vector3d pitch(bin.length / columns, bin.width / rows, 2 * radius);
   std::vector<btRigidBody*> parts;
+  parts.reserve(count);
   for (int i = 0; i < count; ++i) {
     const int column = i % columns, row = i / columns % rows, layer = i / columns / rows;
     Eigen::Vector3d place((column + 0.5) * pitch.x() - bin.length / 2, (row + 0.5) * pitch.y() - bin.width / 2,
@@ -48,7 +49,8 @@ std::vector<btRigidBody*> hang_parts(RigidBodies& bodies, const Mesh& part, cons
 
 std::vector<Pose> poses_of(const RigidBodies& bodies, const std::vector<btRigidBody*>& parts) {
   std::vector<Pose> poses;
-  for (const btRigidBody* body : parts) poses.push_back(bodies.T_world_model(*body));
+  poses.reserve(parts.size());
+  for (const btRigidBody* body : parts) poses.push_back(bodies.pose_of(*body));
   return poses;
 }
 
@@ -93,7 +95,7 @@ absl::StatusOr<std::vector<Pose>> drop_parts(const Mesh& part, const std::vector
     still = settle(bodies, parts);
     before = parts.size();
     std::erase_if(parts, [&](btRigidBody* body) {
-      const bool out = !stands_over_the_floor(part, bodies.T_world_model(*body), bin);
+      const bool out = !stands_over_the_floor(part, bodies.pose_of(*body), bin);
       if (out) bodies.remove(body);
       return out;
     });

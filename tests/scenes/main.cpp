@@ -8,10 +8,8 @@
 #include "core/io/read_mesh.h"
 #include "tests/scenes/make_scene.h"
 
+namespace binpose::scenes {
 namespace {
-
-using namespace binpose;
-using namespace binpose::scenes;
 
 struct Options {
   std::filesystem::path mesh;
@@ -41,10 +39,11 @@ absl::Status run(const Options& options) {
 }
 
 }  // namespace
+}  // namespace binpose::scenes
 
 int main(int argc, char** argv) {
-  Options options;
-  Scanner& scanner = options.params.scanner;
+  binpose::scenes::Options options;
+  binpose::scenes::Scanner& scanner = options.params.scanner;
   CLI::App app("Drops parts into a bin, scans them and writes scan and truth.");
   app.add_option("mesh", options.mesh, "the part, in millimetres")->required()->check(CLI::ExistingFile);
   app.add_option("output", options.output, "folder for the scene")->required();
@@ -67,7 +66,7 @@ int main(int argc, char** argv) {
   scanner.point_spacing = spacing_mm / 1000;
   scanner.noise = noise_mm / 1000;
 
-  const absl::Status status = run(options);
+  const absl::Status status = binpose::scenes::run(options);
   if (status.ok()) return 0;
   std::cerr << "binpose-make-scene: " << status.message() << "\n";
   return 1;

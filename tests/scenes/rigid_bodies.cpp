@@ -68,13 +68,13 @@ RigidBodies::RigidBodies(const Mesh& part, const std::vector<ConvexPiece>& piece
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(solid.spread);
   Eigen::Matrix3d axes = principal.eigenvectors();
   axes.col(2) = axes.col(0).cross(axes.col(1));
-  T_model_body_ = Eigen::Translation3d(solid.centre) * Eigen::Quaterniond(axes);
+  body_frame_ = Eigen::Translation3d(solid.centre) * Eigen::Quaterniond(axes);
   const Eigen::Vector3d s = principal.eigenvalues() * kUnitsPerMetre * kUnitsPerMetre;
   inertia_ = btVector3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y());
 
   for (const ConvexPiece& piece : pieces) {
     std::vector<btVector3> corners;
-    for (const auto& corner : piece) corners.push_back(to_bullet(T_model_body_.inverse() * corner));
+    for (const auto& corner : piece) corners.push_back(to_bullet(body_frame_.inverse() * corner));
     btConvexHullComputer hull;
     hull.compute(corners.data()->m_floats, sizeof(btVector3), static_cast<int>(corners.size()), kShrink, 0.5);
     pieces_.push_back(std::make_unique<btConvexHullShape>(hull.vertices[0].m_floats, hull.vertices.size()));
@@ -102,7 +102,7 @@ btRigidBody* RigidBodies::add_block(const Eigen::AlignedBox3d& box) {
 }
 
 btRigidBody* RigidBodies::add_part(const Pose& T_world_model, const Eigen::Vector3d& spin) {
-  btRigidBody* body = add(&part_shape_, 1, inertia_, to_bullet(T_world_model * T_model_body_));
+  btRigidBody* body = add(&part_shape_, 1, inertia_, to_bullet(T_world_model * body_frame_));
   body->setAngularVelocity({spin.x(), spin.y(), spin.z()});
   return body;
 }
@@ -134,8 +134,8 @@ void RigidBodies::step() {
   world_.stepSimulation(kTimeStep, 0);
 }
 
-Pose RigidBodies::T_world_model(const btRigidBody& body) const {
-  return from_bullet(body.getWorldTransform()) * T_model_body_.inverse();
+Pose RigidBodies::pose_of(const btRigidBody& part) const {
+  return from_bullet(part.getWorldTransform()) * body_frame_.inverse();
 }
 
 }  // namespace binpose::scenes

@@ -29,14 +29,15 @@ class RigidBodies {
   /// Goes on by kTimeStep.
   void step();
 
-  Pose T_world_model(const btRigidBody& body) const;
+  /// T_world_model of a part.
+  Pose pose_of(const btRigidBody& part) const;
 
   static constexpr double kTimeStep = 0.002;  ///< seconds
 
  private:
   btRigidBody* add(btCollisionShape* shape, double mass, const btVector3& inertia, const btTransform& start);
 
-  Pose T_model_body_;  ///< the body's frame: centre of mass, principal axes
+  Pose body_frame_;  ///< T_model_body: centre of mass, principal axes
   btVector3 inertia_;
   std::vector<std::unique_ptr<btConvexHullShape>> pieces_;
   btCompoundShape part_shape_;
