@@ -50,6 +50,17 @@ TrainParams TrainParams::paper() {
   return params;
 }
 
+DetectParams DetectParams::paper() {
+  DetectParams params;
+  params.normal_tolerance = 180 * kDegree;
+  params.use_contours = false;
+  params.refine = false;
+  params.verification = Verification::kAllPoints;
+  params.min_score = 0;
+  params.start_point_share = 1;
+  return params;
+}
+
 absl::Status validate(const TrainParams& params) {
   if (params.observability_weight == 0 && params.distinctiveness_weight == 0) {
     return absl::InvalidArgumentError("observability_weight and distinctiveness_weight are both 0; one must be above.");
@@ -68,7 +79,7 @@ absl::Status validate(const DetectParams& params) {
   return first_error({in_range("min_score", params.min_score, 0, 1),
                       in_range("max_results", params.max_results, 1, 1000),
                       in_range("start_point_share", params.start_point_share, 0.001, 1),
-                      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 45)});
+                      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180)});
 }
 
 }  // namespace binpose

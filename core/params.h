@@ -44,13 +44,25 @@ struct TrainParams {
   bool operator==(const TrainParams&) const = default;
 };
 
+/// How a pose is judged.
+enum class Verification {
+  kVisibleSurface,  ///< what the sensor should see from there: surface, free space, outline
+  kAllPoints,       ///< the paper's alignment error over all model points, seen or not [section IV 5]
+};
+
 /// How a cloud is searched.
 struct DetectParams {
   double min_score = 0.3;                  ///< [0, 1]
   int max_results = 100;                   ///< [1, 1000]
   double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
-  double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 45] degrees
+  double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
+  bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement
+  bool refine = true;        ///< point-to-plane, after clustering
+  Verification verification = Verification::kVisibleSurface;
+
+  /// The paper's settings: no gate, no contours, no refinement, all model points compared.
+  static DetectParams paper();
 
   bool operator==(const DetectParams&) const = default;
 };

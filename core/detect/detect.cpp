@@ -2,194 +2,29 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
-#include "core/detect/cluster.h"
-#include "core/detect/contour_votes.h"
 #include "core/detect/rank.h"
-#include "core/detect/refine.h"
-#include "core/detect/scene_points.h"
-#include "core/detect/verify.h"
-#include "core/detect/vote.h"
+#include "core/detect/search.h"
+#include "core/detect/stage_timer.h"
+#include "core/detect/support_plane.h"
 #include "core/geometry/contours.h"
 #include "core/geometry/depth_map.h"
 #include "core/geometry/normals.h"
-#include "core/parallel.h"
 
 namespace binpose {
 namespace {
 
-// Lengths as shares of the diameter D.
 constexpr double kRelativePixel = 0.014;
 constexpr double kPixelPerSpacing = 1.2;
-constexpr double kRelativeBlock = 0.042;
-constexpr float kClusterRadius = 0.06F;
-constexpr float kNeighbourhood = 0.25F;
-constexpr float kCoarseTolerance = 0.04F;
-constexpr float kFinalTolerance = 0.006F;
-constexpr float kNoiseTolerance = 2.5F;
-constexpr float kFirstGate = 0.08F;
-constexpr float kLastGate = 0.025F;
 constexpr float kContourStep = 0.03F;
 
-constexpr int kCoarsePoints = 80;
-constexpr int kClustersPerNeighbourhood = 20;
-constexpr int kMostClusters = 1000;
-constexpr int kRefinedPerNeighbourhood = 4;
-constexpr int kMostRefined = 200;
-constexpr int kMiddlePoints = 300;
-constexpr int kFinalistsPerNeighbourhood = 6;
-constexpr int kMostFinalists = 150;
-constexpr float kFinestGate = 0.015F;
-constexpr int kFinestIterations = 3;
-constexpr int kFinestPoints = 400;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Adds the time of its scope to a figure.
-class StageTimer {
- public:
-  explicit StageTimer(double& seconds) : seconds_(seconds) {}
-  ~StageTimer() { seconds_ += seconds_since(start_); }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-Eigen::Isometry3f pose_of(const PoseCluster& cluster, const Model& model) {
-  Eigen::Isometry3f T_view_model(cluster.q_view_model);
-  T_view_model.translation() = cluster.centre - T_view_model.linear() * model.centre.cast<float>();
-  return T_view_model;
-}
-
-/// Judges every candidate, in parallel.
-void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& options, const RunControl& control,
-                std::vector<Candidate>& candidates) {
-  parallel_for(static_cast<int>(candidates.size()), control.threads,
-               [&](int i) { candidates[i].evidence = verify(map, model, candidates[i].T_view_model, options); });
-}
-
-/// The best candidates of each neighbourhood, best first.
-std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, const Model& model, int per_place,
-                                          int most) {
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); });
-  const Eigen::Vector3f centre = model.centre.cast<float>();
-  const float reach = kNeighbourhood * static_cast<float>(model.diameter);
-  std::vector<Candidate> kept;
-  for (const Candidate& candidate : candidates) {
-    if (static_cast<int>(kept.size()) >= most) break;
-    const Eigen::Vector3f place = candidate.T_view_model * centre;
-    const auto around = std::count_if(kept.begin(), kept.end(), [&](const Candidate& other) {
-      return (other.T_view_model * centre - place).squaredNorm() < reach * reach;
-    });
-    if (around < per_place) kept.push_back(candidate);
-  }
-  return kept;
-}
-
-Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
-                    DetectStats& stats) {
-  const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * model.diameter / map.pixel_size)));
-  const ScenePoints scene = down_sample(map, block);
-  const std::vector<int> starts = start_points(scene, params.start_point_share);
-  stats.start_point_count += starts.size();
-  return vote(scene, starts, map, model, params, control);
-}
-
-/// Clusters of votes that stand a coarse verification: where the model may be, best first.
-std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, const Model& model, int model_index,
-                                       const RunControl& control, DetectStats& stats) {
-  const auto diameter = static_cast<float>(model.diameter);
-  stats.scene_pair_count += votes.scene_pairs;
-  stats.vote_count += votes.votes.size();
-  std::vector<Candidate> candidates;
-  {
-    const StageTimer timer(stats.cluster_seconds);
-    ClusterOptions options;
-    options.radius = kClusterRadius * diameter;
-    options.neighbourhood = kNeighbourhood * diameter;
-    options.most_per_neighbourhood = kClustersPerNeighbourhood;
-    options.most = kMostClusters;
-    for (const PoseCluster& c : cluster(votes.votes, options)) {
-      candidates.push_back({model_index, pose_of(c, model), c.votes, {}});
-    }
-    stats.cluster_count += candidates.size();
-  }
-  const StageTimer timer(stats.verify_seconds);
-  VerifyOptions coarse;
-  coarse.tolerance = kCoarseTolerance * diameter;
-  coarse.normal_cosine = 0.7F;
-  coarse.most_points = kCoarsePoints;
-  verify_all(map, model, coarse, control, candidates);
-  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
-}
-
-/// Candidates of both sources. Each has a list of its own, so that contours need not outvote surfaces or be outvoted.
-std::vector<Candidate> find_all_candidates(const DepthMap& map, const Model& model, int model_index,
-                                           const DetectParams& params, const RunControl& control, DetectStats& stats) {
-  Votes by_surface, by_contour;
-  {
-    const StageTimer timer(stats.vote_seconds);
-    by_surface = surface_votes(map, model, params, control, stats);
-    by_contour = contour_votes(map, model, control);
-  }
-  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, control, stats);
-  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, control, stats);
-  candidates.insert(candidates.end(), more.begin(), more.end());
-  return candidates;
-}
-
-VerifyOptions final_verification(const DepthMap& map, const Model& model) {
-  VerifyOptions options;
-  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
-  return options;
-}
-
-/// Refines each candidate and judges it anew.
-void refine_all(const DepthMap& map, const Model& model, const RefineOptions& refinement,
-                const VerifyOptions& verification, const RunControl& control, std::vector<Candidate>& candidates,
-                DetectStats& stats) {
-  {
-    const StageTimer timer(stats.refine_seconds);
-    parallel_for(static_cast<int>(candidates.size()), control.threads, [&](int i) {
-      if (control.interrupted()) return;
-      candidates[i].T_view_model = refine(map, model, candidates[i].T_view_model, refinement);
-    });
-  }
-  const StageTimer timer(stats.verify_seconds);
-  verify_all(map, model, verification, control, candidates);
-  stats.verified_count += candidates.size();
-}
-
-/// Refinement from the accuracy of votes to that of the sensor: all candidates with few points, the best with many.
-std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model, std::vector<Candidate> candidates,
-                                         const RunControl& control, DetectStats& stats) {
-  const auto diameter = static_cast<float>(model.diameter);
-  RefineOptions refinement;
-  refinement.first_gate = kFirstGate * diameter;
-  refinement.last_gate = kLastGate * diameter;
-  VerifyOptions verification = final_verification(map, model);
-  verification.most_points = kMiddlePoints;
-  refine_all(map, model, refinement, verification, control, candidates, stats);
-  candidates = best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists);
-  refinement.first_gate = kLastGate * diameter;
-  refinement.last_gate = kFinestGate * diameter;
-  refinement.iterations = kFinestIterations;
-  refinement.most_points = kFinestPoints;
-  refine_all(map, model, refinement, final_verification(map, model), control, candidates, stats);
-  return candidates;
-}
-
-DepthMap prepare(const SensorView& view, const Model& model, const RunControl& control, DetectStats& stats) {
+/// The depth map that suits a model, with all that its search reads.
+DepthMap prepare(const SensorView& view, const Model& model, const DetectParams& params, const RunControl& control,
+                 DetectStats& stats) {
   const StageTimer timer(stats.preprocess_seconds);
   DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing));
   if (view.normals.empty()) estimate_normals(map, 1, control.threads);
+  if (params.remove_support_plane) mark_support_plane(map, static_cast<float>(model.diameter));
   find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control.threads);
   return map;
 }
@@ -204,42 +39,60 @@ PoseHypothesis to_hypothesis(const Candidate& candidate, const DepthMap& map) {
   hypothesis.violated_fraction = candidate.evidence.violated;
   hypothesis.residual = candidate.evidence.residual;
   hypothesis.votes = candidate.votes;
+  hypothesis.occluded_by = candidate.occluded_by;
   return hypothesis;
+}
+
+/// One sentence for an empty result: how far the search came.
+std::string why_nothing_was_found(const DetectStats& stats) {
+  if (stats.stop_reason == StopReason::kDeadline) return "The time ran out before a pose was verified.";
+  if (stats.start_point_count == 0) {
+    return "No surface was found to start from: the cloud is too sparse for the part, or all of it is support plane.";
+  }
+  if (stats.vote_count == 0) return "Nothing in the cloud resembles the part: check the unit and the model.";
+  return "No pose reached min_score: the part is not there, or less of it is visible than the score asks for.";
 }
 
 }  // namespace
 
 absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Model* const> models,
                                     const DetectParams& params, const RunControl& control) {
+  const auto start = std::chrono::steady_clock::now();
   if (absl::Status status = validate(params); !status.ok()) return status;
   if (models.empty()) return absl::InvalidArgumentError("models is empty; it must name at least 1.");
-  const auto start = std::chrono::steady_clock::now();
-  DetectResult result;
   const absl::StatusOr<SensorView> view = sensor_view(cloud);
   if (!view.ok()) return view.status();
-  result.stats.point_count = view->points.size();
+  DetectResult result;
+  DetectStats& stats = result.stats;
+  stats.point_count = view->points.size();
 
-  DepthMap finest;
+  DepthMap finest;  // where models of several sizes meet
   std::vector<Candidate> candidates;
-  VerifyOptionsOf final_options;
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    if (control.stop.stop_requested()) return control.status();
-    const Model& model = *models[m];
-    DepthMap map = prepare(*view, model, control, result.stats);
-    std::vector<Candidate> found = find_all_candidates(map, model, static_cast<int>(m), params, control, result.stats);
-    found = refine_to_the_end(map, model, std::move(found), control, result.stats);
+  std::vector<VerifyOptions> verification;
+  for (std::size_t m = 0; m < models.size() && !control.stop.stop_requested(); ++m) {
+    DepthMap map = prepare(*view, *models[m], params, control, stats);
+    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, control, stats);
     candidates.insert(candidates.end(), found.begin(), found.end());
-    final_options.push_back(final_verification(map, model));
+    verification.push_back(final_verification(map, *models[m]));
     if (m == 0 || map.pixel_size < finest.pixel_size) finest = std::move(map);
   }
   if (control.stop.stop_requested()) return control.status();
-  {
-    const StageTimer timer(result.stats.rank_seconds);
-    for (const Candidate& c : rank(finest, models, final_options, std::move(candidates), params.min_score)) {
-      result.hypotheses.push_back(to_hypothesis(c, finest));
-    }
+
+  if (params.verification == Verification::kVisibleSurface) {
+    const StageTimer timer(stats.rank_seconds);
+    candidates = rank(finest, models, verification, std::move(candidates), params.min_score);
   }
-  result.stats.total_seconds = seconds_since(start);
+  if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
+  if (candidates.size() > static_cast<std::size_t>(params.max_results)) {
+    candidates.resize(params.max_results);
+    if (stats.stop_reason == StopReason::kComplete) stats.stop_reason = StopReason::kMaxResults;
+  }
+  for (Candidate& candidate : candidates) {
+    std::erase_if(candidate.occluded_by, [&](int i) { return i >= params.max_results; });
+    result.hypotheses.push_back(to_hypothesis(candidate, finest));
+  }
+  if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats));
+  stats.total_seconds = seconds_since(start);
   return result;
 }
 

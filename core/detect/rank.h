@@ -15,10 +15,8 @@ struct Candidate {
   Eigen::Isometry3f T_view_model = Eigen::Isometry3f::Identity();
   float votes = 0;
   Evidence evidence;
+  std::vector<int> occluded_by;  ///< indices into the ranked list, ascending; set by rank()
 };
-
-/// Final verification of each model's candidates, by model index.
-using VerifyOptionsOf = std::vector<VerifyOptions>;
 
 /// The best candidates, best first, without doubles.
 ///
@@ -26,8 +24,10 @@ using VerifyOptionsOf = std::vector<VerifyOptions>;
 /// the same part loses its evidence, whatever the part's symmetry. Deterministic: equal scores in the order of the
 /// list.
 ///
+/// @param options    final verification of each model's candidates, by model index.
 /// @param min_score  candidates that score less, at first or for want of free pixels, are dropped.
-std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models, const VerifyOptionsOf& options,
-                            std::vector<Candidate> candidates, double min_score);
+std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models,
+                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates,
+                            double min_score);
 
 }  // namespace binpose

@@ -52,6 +52,9 @@ void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline
   evidence.outline_contradicted = scale * static_cast<float>(contradicted);
 }
 
+/// A prefix of the surface points is evenly spread; this many tell poses apart.
+constexpr std::size_t kAlignedPoints = 500;
+
 }  // namespace
 
 float Evidence::score() const {
@@ -62,6 +65,18 @@ float Evidence::score() const {
   return std::clamp(surface * outline, 0.0F, 1.0F);
 }
 
+float alignment_score(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float cutoff) {
+  const std::size_t count = std::min<std::size_t>(kAlignedPoints, model.surface.size());
+  float sum = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f p = T_view_model * model.surface[i].position;
+    const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
+    const bool measured = pixel >= 0 && map.measured(pixel);
+    sum += measured ? std::min(cutoff, (map.points[pixel] - p).norm()) : cutoff;
+  }
+  return 1 - sum / (cutoff * static_cast<float>(std::max<std::size_t>(1, count)));
+}
+
 int nearest_viewpoint(const Model& model, const Eigen::Isometry3f& T_view_model) {
   const Eigen::Vector3f centre = T_view_model * model.centre.cast<float>();
   const Eigen::Vector3f towards_viewer = T_view_model.linear().transpose() * -centre;
@@ -69,7 +84,7 @@ int nearest_viewpoint(const Model& model, const Eigen::Isometry3f& T_view_model)
 }
 
 Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
-                const VerifyOptions& options, const std::vector<std::uint8_t>* owned) {
+                const VerifyOptions& options, const std::vector<int>* owner) {
   const int viewpoint = nearest_viewpoint(model, T_view_model);
   const std::vector<std::uint16_t>& visible = model.visible_from[viewpoint];
   const int count = std::min(options.most_points, static_cast<int>(visible.size()));
@@ -87,7 +102,7 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
     if (pixel < 0 || !map.measured(pixel)) continue;
     const float distance = normal.dot(map.points[pixel] - p);
     const float depth_step = map.points[pixel].z() - p.z();
-    const bool taken = owned != nullptr && (*owned)[pixel] != 0;
+    const bool taken = map.background[pixel] != 0 || (owner != nullptr && (*owner)[pixel] >= 0);
     // A depth step of a slanted surface within a pixel is no contradiction.
     const float slack = options.tolerance + 1.5F * map.pixel_size;
     if (std::abs(distance) <= options.tolerance && std::abs(depth_step) < 3 * slack) {

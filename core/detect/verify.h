@@ -28,6 +28,11 @@ struct Evidence {
   float score() const;
 };
 
+/// The paper's alignment error as a score [section IV 5]: one less the mean distance of all model points, whether the
+/// sensor could see them or not, to the scene along the ray, each cut off at `cutoff` metres and given as a share of
+/// it.
+float alignment_score(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float cutoff);
+
 /// The viewpoint of training nearest to a viewer at the origin.
 int nearest_viewpoint(const Model& model, const Eigen::Isometry3f& T_view_model);
 
@@ -38,8 +43,10 @@ inline const std::vector<std::uint16_t>& visible_points(const Model& model, cons
 
 /// Compares the visible surface of a pose with the depth map, point by point.
 ///
-/// @param owned  per pixel 1 = explained by a better hypothesis already, which leaves it unexplained here; or null.
+/// Pixels of the background explain nothing.
+/// @param owner  per pixel the better hypothesis that explains it already, which leaves it unexplained here, or -1; or
+/// null.
 Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
-                const VerifyOptions& options, const std::vector<std::uint8_t>* owned = nullptr);
+                const VerifyOptions& options, const std::vector<int>* owner = nullptr);
 
 }  // namespace binpose

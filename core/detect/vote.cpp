@@ -116,6 +116,7 @@ class PairMatcher {
     for (const PairTable::Block& block : model_.pair_table.find(scale, model_.pair_table.bins().bin(normals))) {
       for (unsigned bits = agreeing(block, scaled, least_); bits != 0; bits &= bits - 1) {
         const std::uint32_t pair = block.pair[__builtin_ctz(bits)];
+        if (pair == PairTable::kNoPair) break;
         if (!have_rotation) q_view_frame = Eigen::Quaternionf(M_s);
         have_rotation = true;
         const PairTable::Vote& vote = model_.pair_table.vote(pair);

@@ -1,0 +1,184 @@
+#include "core/detect/search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/detect/cluster.h"
+#include "core/detect/contour_votes.h"
+#include "core/detect/refine.h"
+#include "core/detect/scene_points.h"
+#include "core/detect/stage_timer.h"
+#include "core/detect/vote.h"
+#include "core/parallel.h"
+
+namespace binpose {
+namespace {
+
+// Lengths as shares of the diameter D.
+constexpr double kRelativeBlock = 0.042;
+constexpr float kClusterRadius = 0.06F;
+constexpr float kNeighbourhood = 0.25F;
+constexpr float kCoarseTolerance = 0.04F;
+constexpr float kFinalTolerance = 0.006F;
+constexpr float kNoiseTolerance = 2.5F;
+constexpr float kFirstGate = 0.08F;
+constexpr float kLastGate = 0.025F;
+
+constexpr int kCoarsePoints = 80;
+constexpr int kClustersPerNeighbourhood = 20;
+constexpr int kMostClusters = 1000;
+constexpr int kRefinedPerNeighbourhood = 4;
+constexpr int kMostRefined = 200;
+constexpr int kMiddlePoints = 300;
+constexpr int kFinalistsPerNeighbourhood = 6;
+constexpr int kMostFinalists = 150;
+constexpr float kFinestGate = 0.015F;
+constexpr int kFinestIterations = 3;
+constexpr int kFinestPoints = 400;
+constexpr float kAlignmentCutoff = 0.1F;
+
+Eigen::Isometry3f pose_of(const PoseCluster& cluster, const Model& model) {
+  Eigen::Isometry3f T_view_model(cluster.q_view_model);
+  T_view_model.translation() = cluster.centre - T_view_model.linear() * model.centre.cast<float>();
+  return T_view_model;
+}
+
+/// Judges every candidate, in parallel.
+void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& options, const RunControl& control,
+                std::vector<Candidate>& candidates) {
+  parallel_for(static_cast<int>(candidates.size()), control.threads,
+               [&](int i) { candidates[i].evidence = verify(map, model, candidates[i].T_view_model, options); });
+}
+
+/// The best candidates of each neighbourhood, best first.
+std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, const Model& model, int per_place,
+                                          int most) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); });
+  const Eigen::Vector3f centre = model.centre.cast<float>();
+  const float reach = kNeighbourhood * static_cast<float>(model.diameter);
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : candidates) {
+    if (static_cast<int>(kept.size()) >= most) break;
+    const Eigen::Vector3f place = candidate.T_view_model * centre;
+    const auto around = std::count_if(kept.begin(), kept.end(), [&](const Candidate& other) {
+      return (other.T_view_model * centre - place).squaredNorm() < reach * reach;
+    });
+    if (around < per_place) kept.push_back(candidate);
+  }
+  return kept;
+}
+
+Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
+                    DetectStats& stats) {
+  const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * model.diameter / map.pixel_size)));
+  const ScenePoints scene = down_sample(map, block);
+  const std::vector<int> starts = start_points(scene, params.start_point_share);
+  stats.start_point_count += starts.size();
+  return vote(scene, starts, map, model, params, control);
+}
+
+/// Clusters of votes that stand a coarse verification: where the model may be, best first.
+std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, const Model& model, int model_index,
+                                       const RunControl& control, DetectStats& stats) {
+  const auto diameter = static_cast<float>(model.diameter);
+  stats.scene_pair_count += votes.scene_pairs;
+  stats.vote_count += votes.votes.size();
+  std::vector<Candidate> candidates;
+  {
+    const StageTimer timer(stats.cluster_seconds);
+    ClusterOptions options;
+    options.radius = kClusterRadius * diameter;
+    options.neighbourhood = kNeighbourhood * diameter;
+    options.most_per_neighbourhood = kClustersPerNeighbourhood;
+    options.most = kMostClusters;
+    for (const PoseCluster& c : cluster(votes.votes, options)) {
+      candidates.push_back({model_index, pose_of(c, model), c.votes, {}, {}});
+    }
+    stats.cluster_count += candidates.size();
+  }
+  const StageTimer timer(stats.verify_seconds);
+  VerifyOptions coarse;
+  coarse.tolerance = kCoarseTolerance * diameter;
+  coarse.normal_cosine = 0.7F;
+  coarse.most_points = kCoarsePoints;
+  verify_all(map, model, coarse, control, candidates);
+  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
+}
+
+/// Refines each candidate and judges it anew.
+void refine_all(const DepthMap& map, const Model& model, const RefineOptions& refinement,
+                const VerifyOptions& verification, const RunControl& control, std::vector<Candidate>& candidates,
+                DetectStats& stats) {
+  {
+    const StageTimer timer(stats.refine_seconds);
+    parallel_for(static_cast<int>(candidates.size()), control.threads, [&](int i) {
+      if (control.interrupted()) return;
+      candidates[i].T_view_model = refine(map, model, candidates[i].T_view_model, refinement);
+    });
+  }
+  const StageTimer timer(stats.verify_seconds);
+  verify_all(map, model, verification, control, candidates);
+  stats.verified_count += candidates.size();
+}
+
+/// Refinement from the accuracy of votes to that of the sensor: all candidates with few points, the best with many.
+std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model, std::vector<Candidate> candidates,
+                                         const RunControl& control, DetectStats& stats) {
+  const auto diameter = static_cast<float>(model.diameter);
+  RefineOptions refinement;
+  refinement.first_gate = kFirstGate * diameter;
+  refinement.last_gate = kLastGate * diameter;
+  VerifyOptions verification = final_verification(map, model);
+  verification.most_points = kMiddlePoints;
+  refine_all(map, model, refinement, verification, control, candidates, stats);
+  candidates = best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists);
+  refinement.first_gate = kLastGate * diameter;
+  refinement.last_gate = kFinestGate * diameter;
+  refinement.iterations = kFinestIterations;
+  refinement.most_points = kFinestPoints;
+  refine_all(map, model, refinement, final_verification(map, model), control, candidates, stats);
+  return candidates;
+}
+
+/// The clusters by the paper's alignment error, one a place.
+std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, const DepthMap& map, const Model& model,
+                                          DetectStats& stats) {
+  const StageTimer timer(stats.verify_seconds);
+  const float cutoff = kAlignmentCutoff * static_cast<float>(model.diameter);
+  for (Candidate& candidate : candidates) {
+    candidate.evidence = {};
+    candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
+  }
+  stats.verified_count += candidates.size();
+  return best_of_each_place(std::move(candidates), model, 1, kMostFinalists);
+}
+
+}  // namespace
+
+VerifyOptions final_verification(const DepthMap& map, const Model& model) {
+  VerifyOptions options;
+  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
+  return options;
+}
+
+std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,
+                              const RunControl& control, DetectStats& stats) {
+  Votes by_surface, by_contour;
+  {
+    const StageTimer timer(stats.vote_seconds);
+    by_surface = surface_votes(map, model, params, control, stats);
+    if (params.use_contours) by_contour = contour_votes(map, model, control);
+  }
+  // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
+  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, control, stats);
+  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, control, stats);
+  candidates.insert(candidates.end(), more.begin(), more.end());
+  if (params.refine) candidates = refine_to_the_end(map, model, std::move(candidates), control, stats);
+  if (params.verification == Verification::kAllPoints) {
+    candidates = compare_all_points(std::move(candidates), map, model, stats);
+  }
+  return candidates;
+}
+
+}  // namespace binpose

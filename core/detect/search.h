@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "core/detect/rank.h"
+#include "core/detect/verify.h"
+#include "core/hypothesis.h"
+#include "core/params.h"
+#include "core/run_control.h"
+
+namespace binpose {
+
+/// How closely a refined pose of the model must agree with the map.
+VerifyOptions final_verification(const DepthMap& map, const Model& model);
+
+/// Where one model may be: votes of both sources, clusters, coarse verification, refinement, final verification.
+/// Unranked, with doubles. Counts and times are added to `stats`. Ends early when `control` interrupts.
+std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,
+                              const RunControl& control, DetectStats& stats);
+
+}  // namespace binpose

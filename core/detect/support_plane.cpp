@@ -1,0 +1,96 @@
+#include "core/detect/support_plane.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <optional>
+
+namespace binpose {
+namespace {
+
+constexpr int kSeeds = 200;
+constexpr int kProbes = 4000;  // pixels that a candidate plane is judged on
+constexpr double kLeastShare = 0.1;
+constexpr double kMostBehind = 0.01;
+constexpr float kLeastExtent = 2;  // diameters, both ways
+constexpr float kRelativeTolerance = 0.012F;
+constexpr float kSameNormalCosine = 0.94F;  // 20 degrees
+
+struct Plane {
+  Eigen::Vector3f normal;  // towards the sensor
+  float offset;            // normal . point
+};
+
+/// Every n-th pixel with a normal, so that about `count` are taken.
+std::vector<int> evenly_taken(const DepthMap& map, int count) {
+  std::vector<int> with_normal;
+  for (int i = 0; i < static_cast<int>(map.points.size()); ++i) {
+    if (map.has_normal(i)) with_normal.push_back(i);
+  }
+  std::vector<int> taken;
+  const int available = static_cast<int>(with_normal.size());
+  const int most = std::min(count, available);
+  for (int i = 0; i < most; ++i) taken.push_back(with_normal[static_cast<std::int64_t>(i) * available / most]);
+  return taken;
+}
+
+bool on_plane(const DepthMap& map, int i, const Plane& plane, float tolerance) {
+  return std::abs(plane.normal.dot(map.points[i]) - plane.offset) <= tolerance &&
+         plane.normal.dot(map.normals[i]) >= kSameNormalCosine;
+}
+
+/// Least-squares plane through the probes that lie on a plane.
+Plane refit(const DepthMap& map, const std::vector<int>& probes, const Plane& plane, float tolerance, float& extent) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  int count = 0;
+  for (const int i : probes) {
+    if (!on_plane(map, i, plane, tolerance)) continue;
+    const Eigen::Vector3d p = map.points[i].cast<double>();
+    sum += p;
+    squares += p * p.transpose();
+    ++count;
+  }
+  const Eigen::Vector3d mean = sum / count;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
+  // A strip of length w has a standard deviation of w / sqrt(12) along it.
+  extent = static_cast<float>(std::sqrt(12 * std::max(0.0, axes.eigenvalues()[1])));
+  Eigen::Vector3f normal = axes.eigenvectors().col(0).cast<float>();
+  if (normal.dot(plane.normal) < 0) normal = -normal;
+  return {normal, normal.dot(mean.cast<float>())};
+}
+
+/// The seed plane that holds most probes among those with next to nothing behind them.
+std::optional<Plane> find_plane(const DepthMap& map, float diameter, float tolerance) {
+  const std::vector<int> probes = evenly_taken(map, kProbes);
+  std::optional<Plane> best;
+  auto most = static_cast<int>(kLeastShare * static_cast<double>(probes.size()));
+  for (const int seed : evenly_taken(map, kSeeds)) {
+    const Plane plane{map.normals[seed], map.normals[seed].dot(map.points[seed])};
+    int on = 0, behind = 0;
+    for (const int i : probes) {
+      on += on_plane(map, i, plane, 2 * tolerance);
+      behind += plane.normal.dot(map.points[i]) < plane.offset - 4 * tolerance;
+    }
+    if (on <= most || behind > kMostBehind * static_cast<double>(probes.size())) continue;
+    float extent = 0;
+    const Plane fitted = refit(map, probes, plane, 2 * tolerance, extent);
+    if (extent < kLeastExtent * diameter) continue;
+    most = on;
+    best = fitted;
+  }
+  return best;
+}
+
+}  // namespace
+
+bool mark_support_plane(DepthMap& map, float diameter) {
+  const float tolerance = kRelativeTolerance * diameter + 2 * map.noise;
+  const std::optional<Plane> plane = find_plane(map, diameter, tolerance);
+  if (!plane) return false;
+  for (int i = 0; i < static_cast<int>(map.points.size()); ++i) {
+    map.background[i] = map.has_normal(i) && on_plane(map, i, *plane, tolerance) ? 1 : 0;
+  }
+  return true;
+}
+
+}  // namespace binpose
