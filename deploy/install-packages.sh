@@ -4,12 +4,12 @@
 set -eu
 
 packages="cmake g++ ninja-build
-  libabsl-dev libassimp-dev libcli11-dev libeigen3-dev libgrpc++-dev libprotobuf-dev libspdlog-dev libssl-dev libtbb-dev
-  prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
+  libabsl-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
+  libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
 case "${1:-}" in
   build) ;;
   test)
-    packages="$packages clang-format clang-tidy libgmock-dev libgtest-dev python3"
+    packages="$packages clang-format clang-tidy libgmock-dev libgtest-dev libpcl-dev python3"
     # Node.js from elsewhere brings its own npm and conflicts with Debian's.
     command -v npm >/dev/null || packages="$packages npm ca-certificates"
     ;;

@@ -16,7 +16,11 @@ struct MeshLimits {
   std::size_t max_triangles = 2'000'000;
 };
 
-/// Reads the bytes of an STL (binary, ASCII), PLY or OBJ file; equal vertices are merged, faces triangulated.
+/// Reads the bytes of an STL (binary, ASCII), PLY or OBJ file; equal vertices are merged, unused ones dropped, faces
+/// triangulated. Triangles without area are kept.
+///
+/// The readers are our own: assimp 5.2 crashes on an OBJ file whose faces precede its vertices and hangs on damaged
+/// PLY.
 ///
 /// @param bytes            the file; hostile.
 /// @param metres_per_unit  1 or 0.001.
