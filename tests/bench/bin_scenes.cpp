@@ -1,0 +1,160 @@
+/// Whole scenes: trains the parts of a folder, searches each scene for its part, and compares with the truth.
+///
+///   binpose-bench-scenes PARTS SCENES [--filter TEXT] [--ply] [--threads N] ...
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/detect/detect.h"
+#include "core/train/train.h"
+#include "tests/support/bin_scene.h"
+#include "tests/support/scene_score.h"
+
+namespace {
+
+using namespace binpose;           // NOLINT
+using namespace binpose::testing;  // NOLINT
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+struct Row {
+  SceneScore score;
+  std::vector<double> milliseconds;
+};
+
+void print(const std::string& name, const Row& row) {
+  std::printf(
+      "%-16s %3d scenes  best right %5.1f %%  recall %5.1f %% (%d/%d)  precision %5.1f %% (%d wrong)  median %.1f ms\n",
+      name.c_str(), row.score.scenes, 100.0 * row.score.best_right / row.score.scenes, 100 * row.score.recall(),
+      row.score.hits, row.score.instances, 100 * row.score.precision(), row.score.wrong, median(row.milliseconds));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Searches whole scenes and compares with the truth.");
+  std::string parts_folder, scenes_folder, filter;
+  bool wrong_parts = false;
+  bool ply = false, per_scene = false, dump = false;
+  RunControl control;
+  DetectParams detect_params;
+  TrainParams train_params;
+  app.add_option("parts", parts_folder)->required();
+  app.add_option("scenes", scenes_folder)->required();
+  app.add_option("--filter", filter);
+  app.add_flag("--wrong-parts", wrong_parts, "search each scene for every part but its own: all found is wrong");
+  app.add_flag("--ply", ply);
+  app.add_flag("--per-scene", per_scene);
+  app.add_flag("--dump", dump);
+  app.add_option("--threads", control.threads);
+  app.add_option("--min-score", detect_params.min_score);
+  app.add_option("--pairs", train_params.pairs_per_point);
+  app.add_option("--share", detect_params.start_point_share);
+  std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
+                                                     {"observability", PairSelection::kObservability},
+                                                     {"integration", PairSelection::kIntegration}};
+  PairSelection paper_selection = PairSelection::kIntegration;
+  const CLI::Option* paper =
+      app.add_option("--paper", paper_selection, "the paper's preset with this selection of pairs")
+          ->transform(CLI::CheckedTransformer(selections));
+  CLI11_PARSE(app, argc, argv);
+  if (paper->count() > 0) {
+    train_params = TrainParams::paper();
+    train_params.selection = paper_selection;
+    detect_params = DetectParams::paper();
+  }
+
+  std::map<std::string, std::pair<Model, PoseJudge>> trained;
+  for (const ScenePart& part : read_parts(parts_folder)) {
+    const auto start = std::chrono::steady_clock::now();
+    absl::StatusOr<Model> model = train(part.mesh, train_params, control);
+    if (!model.ok()) {
+      std::fprintf(stderr, "%s: %s\n", part.name.c_str(), model.status().ToString().c_str());
+      return 1;
+    }
+    std::printf("%-16s trained in %.2f s: %zu surface points, %zu pair points, %zu pairs\n", part.name.c_str(),
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->surface.size(),
+                model->pair_points.size(), model->pairs.size());
+    trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
+  }
+
+  std::map<std::string, Row> rows;
+  Row all;
+  DetectStats sum;
+  std::vector<std::filesystem::path> folders;
+  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
+    if (std::filesystem::exists(entry.path() / "gt.json") &&
+        entry.path().filename().string().find(filter) != std::string::npos) {
+      folders.push_back(entry.path());
+    }
+  }
+  std::sort(folders.begin(), folders.end());
+  for (const auto& folder : folders) {
+    const BinScene scene = read_scene(folder, ply);
+    if (wrong_parts) {
+      for (const auto& [name, other] : trained) {
+        if (name == scene.part) continue;
+        const Model* const models[] = {&other.first};
+        const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
+        if (!result.ok()) return 1;
+        for (const PoseHypothesis& p : result->hypotheses) {
+          std::printf("%-16s taken for %-16s score %.3f vis %.3f expl %.3f viol %.3f res %.2e votes %.2f\n",
+                      scene.name.c_str(), name.c_str(), p.score, p.visible_fraction, p.explained_fraction,
+                      p.violated_fraction, p.residual, p.votes);
+        }
+      }
+      continue;
+    }
+    const auto& [model, judge] = trained.at(scene.part);
+    const Model* const models[] = {&model};
+    const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
+    if (!result.ok()) {
+      std::fprintf(stderr, "%s: %s\n", scene.name.c_str(), result.status().ToString().c_str());
+      return 1;
+    }
+    std::vector<int> verdicts;
+    const SceneScore score = judge.score(result->hypotheses, scene.instances, &verdicts);
+    for (Row* row : {&rows[scene.part], &all}) {
+      row->score += score;
+      row->milliseconds.push_back(1000 * result->stats.total_seconds);
+    }
+    if (per_scene) print(scene.name, {score, {1000 * result->stats.total_seconds}});
+    for (std::size_t h = 0; h < result->hypotheses.size() && dump; ++h) {
+      const PoseHypothesis& p = result->hypotheses[h];
+      std::printf("H %s %d %.3f vis %.3f expl %.3f viol %.3f res %.2e votes %.2f\n", scene.part.c_str(), verdicts[h],
+                  p.score, p.visible_fraction, p.explained_fraction, p.violated_fraction, p.residual, p.votes);
+    }
+    const DetectStats& s = result->stats;
+    sum.preprocess_seconds += s.preprocess_seconds;
+    sum.vote_seconds += s.vote_seconds;
+    sum.cluster_seconds += s.cluster_seconds;
+    sum.refine_seconds += s.refine_seconds;
+    sum.verify_seconds += s.verify_seconds;
+    sum.rank_seconds += s.rank_seconds;
+    sum.total_seconds += s.total_seconds;
+    sum.start_point_count += s.start_point_count;
+    sum.scene_pair_count += s.scene_pair_count;
+    sum.vote_count += s.vote_count;
+    sum.cluster_count += s.cluster_count;
+    sum.verified_count += s.verified_count;
+  }
+  for (const auto& [name, row] : rows) print(name, row);
+  if (folders.empty()) return 1;
+  if (wrong_parts) return 0;
+  print("ALL", all);
+  const double n = static_cast<double>(folders.size());
+  std::printf("mean ms: preprocess %.1f vote %.1f cluster %.1f refine %.1f verify %.1f rank %.1f total %.1f\n",
+              1000 * sum.preprocess_seconds / n, 1000 * sum.vote_seconds / n, 1000 * sum.cluster_seconds / n,
+              1000 * sum.refine_seconds / n, 1000 * sum.verify_seconds / n, 1000 * sum.rank_seconds / n,
+              1000 * sum.total_seconds / n);
+  std::printf("mean counts: starts %.0f pairs %.0f votes %.0f clusters %.0f verified %.0f\n", sum.start_point_count / n,
+              sum.scene_pair_count / n, sum.vote_count / n, sum.cluster_count / n, sum.verified_count / n);
+}
