@@ -124,17 +124,17 @@ TEST_P(DataScene, HasNoPartsInEachOther) {
   EXPECT_LT(deepest_penetration(part_, poses), 0.0002);
 }
 
-INTEST(EmptyBin, HoldsNothing) {
+TEST(EmptyBin, HoldsNothing) {
   const testing::BinScene scene = testing::read_scene(kData / "scenes" / "empty_bin_01");
   EXPECT_TRUE(scene.instances.empty());
   const auto measured = [](const Eigen::Vector3f& point) { return !std::isnan(point.z()); };
   EXPECT_GT(std::count_if(scene.cloud.points.begin(), scene.cloud.points.end(), measured), 50000);
 }
 
-STANTIATE_TEST_SUITE_P(All, DataScene,
-                       ::testing::Values("bearing_support_01", "bearing_support_02", "bearing_support_03", "spindle_01",
-                                         "lock_plate_01"),
-                       [](const auto& info) { return info.param; });
+INSTANTIATE_TEST_SUITE_P(All, DataScene,
+                         ::testing::Values("bearing_support_01", "bearing_support_02", "bearing_support_03",
+                                           "spindle_01", "lock_plate_01"),
+                         [](const auto& info) { return info.param; });
 
 }  // namespace
 }  // namespace binpose::scenes
