@@ -1,0 +1,96 @@
+#include "client/client.h"
+
+#include <utility>
+
+#include "client/call_error.h"
+
+namespace binpose::client {
+namespace {
+
+std::shared_ptr<grpc::Channel> open_channel(const std::string& server) {
+  grpc::ChannelArguments arguments;
+  // The server states its own limits in its errors; gRPC's 4 MB would refuse answers here before anyone reads them.
+  arguments.SetMaxReceiveMessageSize(-1);
+  arguments.SetMaxSendMessageSize(-1);
+  // Notices a peer that vanished without a word. Servers take more than one ping in five minutes for abuse.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 310'000);
+  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+}
+
+void set_timeout(std::chrono::milliseconds timeout, grpc::ClientContext& context) {
+  context.set_deadline(std::chrono::system_clock::now() + timeout);
+}
+
+}  // namespace
+
+Client::Client(std::string server, Timeouts timeouts)
+    : server_(std::move(server)),
+      timeouts_(timeouts),
+      channel_(open_channel(server_)),
+      models_(v1::ModelService::NewStub(channel_)),
+      detection_(v1::DetectionService::NewStub(channel_)) {}
+
+absl::StatusOr<v1::Model> Client::train(const v1::TrainRequest& request, const TrainObserver& observer) {
+  const CallName call{"Training model \"" + request.id() + "\"", server_};
+  grpc::ClientContext context;
+  set_timeout(timeouts_.training, context);
+  const auto stream = models_->Train(&context, request);
+  v1::TrainResponse progress;
+  v1::Model model;
+  bool is_done = false;
+  while (stream->Read(&progress)) {
+    if (observer) observer(progress);
+    if (!progress.has_model()) continue;
+    model = progress.model();
+    is_done = true;
+  }
+  if (absl::Status status = call_error(stream->Finish(), call); !status.ok()) return status;
+  if (!is_done) return absl::InternalError(call.what + " failed: the server at " + server_ + " sent no model.");
+  return model;
+}
+
+absl::StatusOr<v1::Model> Client::get_model(const std::string& id) {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::GetModelRequest request;
+  request.set_id(id);
+  v1::Model model;
+  const grpc::Status status = models_->GetModel(&context, request, &model);
+  if (!status.ok()) return call_error(status, {"Reading model \"" + id + "\"", server_});
+  return model;
+}
+
+absl::StatusOr<v1::ListModelsResponse> Client::list_models() {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::ListModelsResponse models;
+  const grpc::Status status = models_->ListModels(&context, v1::ListModelsRequest(), &models);
+  if (!status.ok()) return call_error(status, {"Listing the models", server_});
+  return models;
+}
+
+absl::Status Client::delete_model(const std::string& id) {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::DeleteModelRequest request;
+  request.set_id(id);
+  v1::DeleteModelResponse response;
+  return call_error(models_->DeleteModel(&context, request, &response), {"Deleting model \"" + id + "\"", server_});
+}
+
+absl::StatusOr<v1::DetectResponse> Client::detect(const v1::DetectRequest& request) {
+  const std::unique_ptr<DetectStream> stream = open_detect_stream();
+  if (absl::Status status = stream->write(request); !status.ok()) return status;
+  stream->done_writing();
+  std::optional<v1::DetectResponse> answer = stream->read();
+  if (absl::Status status = stream->finish(); !status.ok()) return status;
+  if (!answer.has_value()) return absl::InternalError("The server at " + server_ + " sent no answer to the scan.");
+  if (absl::Status status = frame_error(*answer); !status.ok()) return status;
+  return *std::move(answer);
+}
+
+std::unique_ptr<DetectStream> Client::open_detect_stream() {
+  return std::make_unique<DetectStream>(*detection_, server_, timeouts_.answer);
+}
+
+}  // namespace binpose::client

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "binpose/v1/detection_service.grpc.pb.h"
+#include "binpose/v1/model_service.grpc.pb.h"
+#include "client/detect_stream.h"
+
+namespace binpose::client {
+
+/// How long to wait for a server.
+struct Timeouts {
+  std::chrono::milliseconds call = std::chrono::seconds(10);      ///< a short call: to get, list or delete models
+  std::chrono::milliseconds training = std::chrono::minutes(10);  ///< a whole training
+  std::chrono::milliseconds answer = std::chrono::minutes(1);     ///< the next answer on a stream of frames
+};
+
+/// Told what a training does; see TrainResponse.
+using TrainObserver = std::function<void(const v1::TrainResponse& progress)>;
+
+/// A connection to a binpose server. Thread-safe; make one and keep it.
+///
+/// Every error is a sentence that says what failed, where, and what to do next; its code is that of the gRPC call.
+class Client {
+ public:
+  /// `server`: HOST:PORT, plaintext. Connects with the first call, and again when the connection is lost.
+  explicit Client(std::string server, Timeouts timeouts = {});
+
+  /// Trains a model and waits until it is served. `observer` is called on this thread, for every message of progress.
+  absl::StatusOr<v1::Model> train(const v1::TrainRequest& request, const TrainObserver& observer = {});
+
+  absl::StatusOr<v1::Model> get_model(const std::string& id);
+  absl::StatusOr<v1::ListModelsResponse> list_models();
+  absl::Status delete_model(const std::string& id);
+
+  /// Searches one scan. An answer that carries an `error` becomes that error.
+  absl::StatusOr<v1::DetectResponse> detect(const v1::DetectRequest& request);
+
+  /// Opens a stream for any number of scans. It may outlive the client.
+  std::unique_ptr<DetectStream> open_detect_stream();
+
+ private:
+  std::string server_;
+  Timeouts timeouts_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::ModelService::Stub> models_;
+  std::unique_ptr<v1::DetectionService::Stub> detection_;
+};
+
+}  // namespace binpose::client

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "binpose/v1/detection_service.grpc.pb.h"
+#include "binpose/v1/model_service.grpc.pb.h"
+
+namespace binpose::client {
+
+/// A server in this process that answers what it is told to.
+class FakeServer final : v1::ModelService::Service, v1::DetectionService::Service {
+ public:
+  using Answer = std::function<v1::DetectResponse(const v1::DetectRequest&)>;
+
+  FakeServer() {
+    grpc::ServerBuilder builder;
+    builder.SetMaxReceiveMessageSize(-1);
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
+    builder.RegisterService(static_cast<v1::ModelService::Service*>(this));
+    builder.RegisterService(static_cast<v1::DetectionService::Service*>(this));
+    server_ = builder.BuildAndStart();
+  }
+  ~FakeServer() override { server_->Shutdown(std::chrono::system_clock::now()); }
+  FakeServer(const FakeServer&) = delete;
+  FakeServer& operator=(const FakeServer&) = delete;
+
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+
+  // To be set before the first call.
+  Answer answer = [](const v1::DetectRequest&) { return v1::DetectResponse(); };
+  int answers_before_end = -1;  ///< then the stream breaks with INTERNAL; -1: never
+  grpc::Status call_status;     ///< of every call of the ModelService
+  bool sends_model = true;
+
+  std::vector<v1::DetectRequest> detect_requests() {
+    const std::lock_guard lock(mutex_);
+    return detect_requests_;
+  }
+  v1::TrainRequest train_request() {
+    const std::lock_guard lock(mutex_);
+    return train_request_;
+  }
+  int stream_count() {
+    const std::lock_guard lock(mutex_);
+    return stream_count_;
+  }
+
+ private:
+  using DetectChannel = grpc::ServerReaderWriter<v1::DetectResponse, v1::DetectRequest>;
+
+  /// Takes no request before it has answered the last one: more back-pressure than the wire API's two requests ahead.
+  grpc::Status Detect(grpc::ServerContext* /*context*/, DetectChannel* stream) override {
+    {
+      const std::lock_guard lock(mutex_);
+      ++stream_count_;
+    }
+    v1::DetectRequest request;
+    for (int answered = 0; answered != answers_before_end; ++answered) {
+      if (!stream->Read(&request)) return grpc::Status::OK;
+      {
+        const std::lock_guard lock(mutex_);
+        detect_requests_.push_back(request);
+      }
+      v1::DetectResponse response = answer(request);
+      response.set_request_id(request.request_id());
+      if (!stream->Write(response)) return grpc::Status::CANCELLED;
+    }
+    return {grpc::StatusCode::INTERNAL, "The fake server has had enough."};
+  }
+
+  grpc::Status Train(grpc::ServerContext* /*context*/, const v1::TrainRequest* request,
+                     grpc::ServerWriter<v1::TrainResponse>* writer) override {
+    {
+      const std::lock_guard lock(mutex_);
+      train_request_ = *request;
+    }
+    if (!call_status.ok()) return call_status;
+    v1::TrainResponse response;
+    response.set_stage(v1::TRAIN_STAGE_SAMPLING);
+    response.set_progress(0.25);
+    writer->Write(response);
+    response.set_stage(v1::TRAIN_STAGE_DONE);
+    response.set_progress(1);
+    if (sends_model) response.mutable_model()->set_id(request->id());
+    writer->Write(response);
+    return grpc::Status::OK;
+  }
+
+  grpc::Status GetModel(grpc::ServerContext* /*context*/, const v1::GetModelRequest* request,
+                        v1::Model* model) override {
+    model->set_id(request->id());
+    model->set_diameter(0.1);
+    return call_status;
+  }
+
+  grpc::Status ListModels(grpc::ServerContext* /*context*/, const v1::ListModelsRequest* /*request*/,
+                          v1::ListModelsResponse* models) override {
+    models->add_models()->set_id("bolt");
+    models->add_models()->set_id("gear");
+    return call_status;
+  }
+
+  grpc::Status DeleteModel(grpc::ServerContext* /*context*/, const v1::DeleteModelRequest* /*request*/,
+                           v1::DeleteModelResponse* /*response*/) override {
+    return call_status;
+  }
+
+  std::mutex mutex_;
+  std::vector<v1::DetectRequest> detect_requests_;
+  v1::TrainRequest train_request_;
+  int stream_count_ = 0;
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace binpose::client
