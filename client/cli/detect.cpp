@@ -1,0 +1,144 @@
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <future>
+#include <iostream>
+#include <memory>
+#include <numbers>
+#include <thread>
+
+#include "client/call_error.h"
+#include "client/cli/command.h"
+#include "client/cli/json.h"
+#include "client/cli/scan_options.h"
+#include "client/cli/table.h"
+
+namespace binpose::client::cli {
+namespace {
+
+struct RollPitchYaw {
+  double roll = 0, pitch = 0, yaw = 0;  ///< degrees
+};
+
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+RollPitchYaw roll_pitch_yaw(const v1::Quaternion& q) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const double sin_pitch = 2 * (q.w() * q.y() - q.z() * q.x());
+  return {.roll = kDegrees * std::atan2(2 * (q.w() * q.x() + q.y() * q.z()), 1 - 2 * (q.x() * q.x() + q.y() * q.y())),
+          .pitch = kDegrees * std::asin(std::clamp(sin_pitch, -1.0, 1.0)),
+          .yaw = kDegrees * std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()))};
+}
+
+Table table_of(const v1::DetectResponse& answer, double millimetres_per_unit) {
+  Table table = {{"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible"}};
+  for (const v1::PoseHypothesis& part : answer.hypotheses()) {
+    const v1::Vector3& position = part.pose().position();
+    const RollPitchYaw angles = roll_pitch_yaw(part.pose().orientation());
+    table.push_back({std::to_string(table.size()), part.model_id(), fixed(position.x() * millimetres_per_unit, 2),
+                     fixed(position.y() * millimetres_per_unit, 2), fixed(position.z() * millimetres_per_unit, 2),
+                     fixed(angles.roll, 1), fixed(angles.pitch, 1), fixed(angles.yaw, 1), fixed(part.score(), 3),
+                     fixed(part.visible_fraction(), 2)});
+  }
+  return table;
+}
+
+void print_answer(const v1::DetectResponse& answer, const std::string& scene, double millimetres_per_unit) {
+  const v1::DetectStats& stats = answer.stats();
+  const int count = answer.hypotheses_size();
+  std::cout << scene << ": " << (count == 0 ? "nothing" : std::to_string(count)) << " found in "
+            << fixed(1000 * stats.total_seconds(), 1) << " ms";
+  if (stats.stop_reason() == v1::STOP_REASON_DEADLINE) std::cout << " (stopped early by the deadline)";
+  if (stats.stop_reason() == v1::STOP_REASON_MAX_RESULTS) std::cout << " (the best of more)";
+  std::cout << '\n';
+  if (count > 0) print(table_of(answer, millimetres_per_unit), std::cout);
+  for (const std::string& warning : answer.warnings()) std::cout << "warning: " << warning << '\n';
+  std::cout << std::flush;
+}
+
+/// Writes the scenes to the stream in a thread of its own, and tells of each in turn whether it could be read.
+class SceneWriter {
+ public:
+  SceneWriter(const ScanOptions& options, DetectStream& stream)
+      : reads_(options.scenes.size()), thread_([this, &options, &stream] { write_all(options, stream); }) {}
+
+  ~SceneWriter() {
+    is_stopped_ = true;
+    thread_.join();
+  }
+
+  SceneWriter(const SceneWriter&) = delete;
+  SceneWriter& operator=(const SceneWriter&) = delete;
+
+  /// OK once scene `i` is on its way, or why its file cannot be read. To be called once for each, in order.
+  absl::Status wait_for(std::size_t i) { return reads_[i].get_future().get(); }
+
+ private:
+  void write_all(const ScanOptions& options, DetectStream& stream) {
+    for (std::size_t i = 0; i < reads_.size() && !is_stopped_; ++i) {
+      const absl::StatusOr<v1::DetectRequest> request = make_request(options, options.scenes[i]);
+      reads_[i].set_value(request.status());
+      // Where writing fails the stream has ended; whoever reads its answers will see.
+      if (request.ok() && !stream.write(*request).ok()) return;
+    }
+    stream.done_writing();
+  }
+
+  std::atomic<bool> is_stopped_ = false;
+  std::vector<std::promise<absl::Status>> reads_;
+  std::thread thread_;
+};
+
+/// An answer that never went over the wire, so that --json has one line for every scene.
+v1::DetectResponse local_answer(const std::string& scene, const absl::Status& error) {
+  v1::DetectResponse answer;
+  answer.set_request_id(request_id_of(scene));
+  answer.mutable_error()->set_code(static_cast<int>(error.code()));
+  answer.mutable_error()->set_message(std::string(error.message()));
+  return answer;
+}
+
+/// Prints the answer of each scene as it comes; says how the first scene that failed did so.
+ExitCode exchange(const ScanOptions& options, bool json, DetectStream& stream) {
+  ExitCode exit_code = kOk;
+  const auto fail = [&](const std::string& scene, const absl::Status& error, ExitCode code) {
+    report({error.code(), scene + ": " + std::string(error.message())});
+    if (exit_code == kOk) exit_code = code;
+  };
+  SceneWriter writer(options, stream);
+  for (std::size_t i = 0; i < options.scenes.size(); ++i) {
+    const std::string& scene = options.scenes[i];
+    const absl::Status unread = writer.wait_for(i);
+    const std::optional<v1::DetectResponse> answer = unread.ok() ? stream.read() : local_answer(scene, unread);
+    if (!answer.has_value()) break;
+    const absl::Status error = frame_error(*answer);
+    if (!error.ok()) fail(scene, error, unread.ok() ? kRefused : kUnreadable);
+    if (json) {
+      std::cout << answer_json(*answer) << std::endl;
+    } else if (error.ok()) {
+      print_answer(*answer, scene, options.unit == v1::LENGTH_UNIT_METRE ? 1000 : 1);
+    }
+  }
+  return exit_code;
+}
+
+ExitCode detect(const ScanOptions& options, const GlobalOptions& global) {
+  Client client = connect(global);
+  const std::unique_ptr<DetectStream> stream = client.open_detect_stream();
+  const ExitCode exit_code = exchange(options, global.json, *stream);
+  if (absl::Status status = stream->finish(); !status.ok()) return report_call(status);
+  return exit_code;
+}
+
+}  // namespace
+
+void add_detect(CLI::App& app, const GlobalOptions& global, Command& chosen) {
+  const auto options = std::make_shared<ScanOptions>();
+  CLI::App& command = *app.add_subcommand("detect", "Find parts in scenes; all scenes go over one stream, in order");
+  command.footer(
+      "\nA pose maps the part's CAD frame to the scene's frame: position in mm, R = Rz(yaw) Ry(pitch) Rx(roll) in "
+      "degrees.");
+  add_scan_options(command, *options);
+  command.callback([&chosen, options, &global] { chosen = [options, &global] { return detect(*options, global); }; });
+}
+
+}  // namespace binpose::client::cli

@@ -1,0 +1,57 @@
+#include <iostream>
+
+#include "client/cli/command.h"
+
+namespace binpose::client::cli {
+namespace {
+
+constexpr const char* kFooter = R"(
+Examples:
+  binpose train --id gear --mesh gear.stl --unit mm
+  binpose detect --model gear --scene bin.ply --unit mm
+  binpose detect --model gear bolt --scene scan_1/ scan_2/ --unit mm --json
+  binpose request --model gear --scene bin.pcd --unit m | grpcurl -plaintext -d @ localhost:50051 \
+      binpose.v1.DetectionService/Detect
+
+Exit codes: 0 done; 1 refused by the server, or a scene failed; 2 wrong usage; 3 a file cannot be read;
+4 no server, or no answer in time.)";
+
+/// What a subcommand did not foresee ends here, as a sentence: a library that throws, memory that runs out.
+int run(int argc, char** argv) {
+  CLI::App app("Finds trained parts in point clouds: the command-line client of binpose-server.", "binpose");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.fallthrough();
+  GlobalOptions global;
+  app.add_option("--server", global.server, "Address of the server, HOST:PORT")
+      ->envname("BINPOSE_SERVER")
+      ->capture_default_str();
+  app.add_flag("--json", global.json, "Print the answers as JSON, one object per line");
+  app.add_option("--timeout", global.timeout_seconds, "Seconds to wait for an answer; for a training: for all of it")
+      ->check(CLI::Range(0.001, 1e6));
+  Command chosen;
+  add_train(app, global, chosen);
+  add_detect(app, global, chosen);
+  add_models(app, global, chosen);
+  add_model(app, global, chosen);
+  add_delete(app, global, chosen);
+  add_request(app, global, chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;
+  }
+  return chosen();
+}
+
+}  // namespace
+}  // namespace binpose::client::cli
+
+int main(int argc, char** argv) {
+  try {
+    return binpose::client::cli::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "binpose: " << error.what() << std::endl;
+    return binpose::client::cli::kRefused;
+  }
+}

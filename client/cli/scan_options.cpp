@@ -1,0 +1,50 @@
+#include "client/cli/scan_options.h"
+
+#include "client/cli/choice.h"
+#include "client/scene.h"
+
+namespace binpose::client::cli {
+
+void add_scan_options(CLI::App& command, ScanOptions& options) {
+  command.add_option("--model", options.model_ids, "IDs of the parts to look for")->required()->type_name("ID...");
+  command
+      .add_option("--scene", options.scenes,
+                  "PLY or PCD file, depth image (with --camera), or a folder with camera.json and its depth image")
+      ->required()
+      ->type_name("FILE...");
+  add_unit(command, options.unit, "Unit of the scene's lengths (of a depth image: of the answer's)");
+  command.add_option("--camera", options.camera, "Camera file of depth images, JSON")->type_name("FILE");
+  command.add_option("--max-results", options.max_results, "At most this many poses, best first");
+  command.add_option("--min-score", options.min_score, "Leave out poses that score less, 0 to 1");
+  command.add_option("--start-point-share", options.start_point_share,
+                     "Share of the scene's points that the search starts from, above 0 to 1");
+  command.add_option("--normal-tolerance", options.normal_tolerance_degrees,
+                     "Largest angle between alike normals of scene and model, degrees");
+  command.add_flag("--keep-support-plane", options.keep_support_plane,
+                   "Search the plane that the parts lie on as well, instead of leaving it out");
+}
+
+std::string request_id_of(const std::string& scene) {
+  constexpr std::size_t kMaxBytes = 256;
+  return scene.size() <= kMaxBytes ? scene : scene.substr(scene.size() - kMaxBytes);
+}
+
+absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const std::string& scene) {
+  absl::StatusOr<v1::PointCloud> cloud = read_scene(scene, options.camera, options.unit);
+  if (!cloud.ok()) return cloud.status();
+  v1::DetectRequest request;
+  request.set_request_id(request_id_of(scene));
+  request.mutable_model_ids()->Add(options.model_ids.begin(), options.model_ids.end());
+  *request.mutable_cloud() = *std::move(cloud);
+  v1::DetectParams& params = *request.mutable_params();
+  if (options.max_results.has_value()) params.set_max_results(*options.max_results);
+  if (options.min_score.has_value()) params.set_min_score(*options.min_score);
+  if (options.start_point_share.has_value()) params.set_start_point_share(*options.start_point_share);
+  if (options.normal_tolerance_degrees.has_value()) {
+    params.set_normal_tolerance_degrees(*options.normal_tolerance_degrees);
+  }
+  if (options.keep_support_plane) params.set_remove_support_plane(false);
+  return request;
+}
+
+}  // namespace binpose::client::cli

@@ -1,0 +1,261 @@
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/client/fake_server.h"
+#include "tests/client/temporary_directory.h"
+
+namespace binpose::client {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+struct Output {
+  int exit_code = 0;
+  std::string out;
+  std::string err;
+};
+
+/// The `binpose` command, run as a user runs it, against a server in this process.
+class Cli : public ::testing::Test {
+ protected:
+  /// `files`: what follows the last option.
+  Output run(const std::string& arguments, const std::vector<std::string>& files = {}) {
+    std::ostringstream command;
+    command << "BINPOSE_SERVER=" << server_.address() << " " << BINPOSE_COMMAND << " " << arguments;
+    for (const std::string& file : files) command << " '" << file << "'";
+    command << " >" << path("out") << " 2>" << path("err") << " </dev/null";
+    const int status = std::system(command.str().c_str());  // NOLINT(cert-env33-c): a shell is what users have
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, files_.read("out"), files_.read("err")};
+  }
+
+  std::string path(const std::string& name) const { return (files_.path() / name).string(); }
+  std::string file(const std::string& name, std::string_view bytes) const { return files_.write(name, bytes).string(); }
+
+  static std::vector<v1::DetectResponse> parse_lines(const std::string& text) {
+    std::vector<v1::DetectResponse> answers;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(line, &answers.emplace_back()).ok()) << line;
+    }
+    return answers;
+  }
+
+  FakeServer server_;
+  TemporaryDirectory files_;
+};
+
+/// One part, turned by 90 degrees about z.
+v1::DetectResponse one_part(const v1::DetectRequest& request) {
+  v1::DetectResponse response;
+  v1::PoseHypothesis& part = *response.add_hypotheses();
+  part.set_model_id(request.model_ids(0));
+  part.mutable_pose()->mutable_position()->set_x(1.25);
+  part.mutable_pose()->mutable_position()->set_z(500);
+  part.mutable_pose()->mutable_orientation()->set_z(0.70710678118654757);
+  part.mutable_pose()->mutable_orientation()->set_w(0.70710678118654757);
+  part.set_score(0.875);
+  part.set_visible_fraction(0.5);
+  response.mutable_stats()->set_total_seconds(0.0235);
+  return response;
+}
+
+/// An error for the scene whose bytes are "# bad".
+v1::DetectResponse refuse_bad(const v1::DetectRequest& request) {
+  v1::DetectResponse response;
+  if (request.cloud().pcd() != "# bad") return one_part(request);
+  response.mutable_error()->set_code(3);
+  response.mutable_error()->set_message("The cloud is bad.");
+  return response;
+}
+
+TEST_F(Cli, HelpShowsExamplesAndExitCodes) {
+  const Output help = run("--help");
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("Examples:"), HasSubstr("Exit codes:"), HasSubstr("BINPOSE_SERVER")));
+}
+
+TEST_F(Cli, WrongUsageExitsWith2AndNamesTheOption) {
+  EXPECT_EQ(run("").exit_code, 2);
+  const Output output = run("detect --model gear --scene a.ply --unit cm");
+  EXPECT_EQ(output.exit_code, 2);
+  EXPECT_THAT(output.err, AllOf(HasSubstr("--unit"), HasSubstr("\"cm\"")));
+  EXPECT_THAT(run("train --id gear --mesh a.stl").err, HasSubstr("--unit"));
+}
+
+TEST_F(Cli, NoServerExitsWith4AndNamesTheAddress) {
+  const Output output = run("--server 127.0.0.1:1 models");
+  EXPECT_EQ(output.exit_code, 4);
+  EXPECT_THAT(output.err, AllOf(StartsWith("binpose: "), HasSubstr("127.0.0.1:1")));
+}
+
+TEST_F(Cli, TrainSendsTheMeshAndEveryParameter) {
+  const Output output =
+      run("train --id gear --unit mm --preset paper --selection observability --viewpoints 64 "
+          "--pairs-per-point 0.5 --pair-lengths 0.4 0.2 --pair-lengths 0.3 0.1 --bin-width 10 "
+          "--relative-sampling 0.05 --observability-weight 2 --distinctiveness-weight 3 --mesh",
+          {file("gear.stl", "bytes")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_THAT(output.out, AllOf(StartsWith("trained gear in "), HasSubstr("diameter")));
+  const v1::TrainRequest request = server_.train_request();
+  EXPECT_EQ(request.mesh().data(), "bytes");
+  EXPECT_EQ(request.mesh().unit(), v1::LENGTH_UNIT_MILLIMETRE);
+  EXPECT_EQ(request.params().preset(), v1::TRAIN_PRESET_PAPER);
+  EXPECT_EQ(request.params().selection(), v1::PAIR_SELECTION_OBSERVABILITY);
+  EXPECT_EQ(request.params().viewpoint_count(), 64u);
+  EXPECT_EQ(request.params().pairs_per_point(), 0.5);
+  ASSERT_EQ(request.params().pair_lengths_size(), 2);
+  EXPECT_EQ(request.params().pair_lengths(1).relative_q2(), 0.1);
+  EXPECT_EQ(request.params().bin_width_degrees(), 10);
+  EXPECT_EQ(request.params().relative_sampling(), 0.05);
+  EXPECT_EQ(request.params().observability_weight(), 2);
+  EXPECT_EQ(request.params().distinctiveness_weight(), 3);
+}
+
+TEST_F(Cli, TrainWithoutOptionsLeavesEveryParameterToTheServer) {
+  ASSERT_EQ(run("train --id gear --unit m --mesh", {file("gear.stl", "bytes")}).exit_code, 0);
+  EXPECT_EQ(server_.train_request().params().ByteSizeLong(), 0u);
+}
+
+TEST_F(Cli, TrainAsJsonPrintsTheModelAndNothingElse) {
+  const Output output = run("train --json --id gear --unit mm --mesh", {file("gear.stl", "bytes")});
+  v1::Model model;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(output.out, &model).ok()) << output.out;
+  EXPECT_EQ(model.id(), "gear");
+  EXPECT_THAT(output.err, IsEmpty());
+}
+
+TEST_F(Cli, AMeshThatCannotBeReadExitsWith3) {
+  const Output output = run("train --id gear --unit mm --mesh", {path("missing.stl")});
+  EXPECT_EQ(output.exit_code, 3);
+  EXPECT_THAT(output.err, HasSubstr("missing.stl"));
+}
+
+TEST_F(Cli, ARefusalExitsWith1AndGivesTheServersReason) {
+  server_.call_status = {grpc::StatusCode::INVALID_ARGUMENT, "The mesh has no face."};
+  const Output output = run("train --id gear --unit mm --mesh", {file("gear.stl", "bytes")});
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_THAT(output.err, AllOf(HasSubstr("gear"), HasSubstr("The mesh has no face.")));
+}
+
+TEST_F(Cli, DetectPrintsATableOfPosesInMillimetresAndDegrees) {
+  server_.answer = one_part;
+  const Output output = run("detect --model gear --unit mm --scene", {file("bin.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(output.out, path("bin.pcd") +
+                            ": 1 found in 23.5 ms\n"
+                            "rank  model  x mm  y mm    z mm  roll deg  pitch deg  yaw deg  score  visible\n"
+                            "   1  gear   1.25  0.00  500.00       0.0        0.0     90.0  0.875     0.50\n");
+}
+
+TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
+  server_.answer = one_part;
+  EXPECT_THAT(run("detect --model gear --unit m --scene", {file("bin.pcd", "#")}).out, HasSubstr("1250.00"));
+}
+
+TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
+  const Output output =
+      run("detect --model gear bolt --unit mm --max-results 5 --min-score 0 --start-point-share 0.5 "
+          "--normal-tolerance 15 --keep-support-plane --scene",
+          {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(server_.stream_count(), 1);
+  const std::vector<v1::DetectRequest> requests = server_.detect_requests();
+  ASSERT_EQ(requests.size(), 2u);
+  EXPECT_EQ(requests[0].cloud().pcd(), "# a");
+  EXPECT_EQ(requests[1].cloud().ply(), "ply\nb");
+  const v1::DetectRequest& request = requests[0];
+  EXPECT_THAT(request.model_ids(), ::testing::ElementsAre("gear", "bolt"));
+  EXPECT_EQ(request.params().max_results(), 5u);
+  EXPECT_TRUE(request.params().has_min_score());
+  EXPECT_EQ(request.params().start_point_share(), 0.5);
+  EXPECT_EQ(request.params().normal_tolerance_degrees(), 15);
+  EXPECT_TRUE(request.params().has_remove_support_plane());
+  EXPECT_FALSE(request.params().remove_support_plane());
+}
+
+TEST_F(Cli, DetectAsJsonPrintsOneAnswerALineInTheOrderOfTheScenes) {
+  server_.answer = one_part;
+  const Output output = run("detect --json --model gear --unit mm --scene", {file("a.pcd", "#"), file("b.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  const std::vector<v1::DetectResponse> answers = parse_lines(output.out);
+  ASSERT_EQ(answers.size(), 2u);
+  EXPECT_EQ(answers[0].request_id(), path("a.pcd"));
+  EXPECT_EQ(answers[1].request_id(), path("b.pcd"));
+  EXPECT_EQ(answers[1].hypotheses(0).score(), 0.875);
+  EXPECT_THAT(output.out,
+              AllOf(HasSubstr("\"visibleFraction\":0.5"), HasSubstr("\"totalSeconds\":0.0235"), HasSubstr("\"y\":0,")));
+}
+
+TEST_F(Cli, AFailingSceneIsReportedAndTheOthersGoOn) {
+  server_.answer = refuse_bad;
+  const Output output =
+      run("detect --model gear --unit mm --scene", {file("a.pcd", "#"), file("bad.pcd", "# bad"), file("c.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_THAT(output.err, AllOf(HasSubstr("bad.pcd"), HasSubstr("The cloud is bad."), Not(HasSubstr("c.pcd"))));
+  EXPECT_THAT(output.out, AllOf(HasSubstr("a.pcd: 1 found"), HasSubstr("c.pcd: 1 found")));
+}
+
+TEST_F(Cli, AnUnreadableSceneExitsWith3AndTheOthersGoOn) {
+  server_.answer = one_part;
+  const Output output = run("detect --json --model gear --unit mm --scene", {path("missing.ply"), file("b.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 3);
+  EXPECT_THAT(output.err, HasSubstr("missing.ply"));
+  const std::vector<v1::DetectResponse> answers = parse_lines(output.out);
+  ASSERT_EQ(answers.size(), 2u);
+  EXPECT_TRUE(answers[0].has_error());
+  EXPECT_EQ(answers[1].hypotheses_size(), 1);
+}
+
+TEST_F(Cli, ABrokenStreamExitsWith1AndSaysWhy) {
+  server_.answers_before_end = 1;
+  std::vector<std::string> scenes;
+  for (int i = 0; i < 20; ++i) scenes.push_back(file(std::to_string(i) + ".pcd", "#"));
+  const Output output = run("detect --model gear --unit mm --scene", scenes);
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_THAT(output.err, HasSubstr("had enough"));
+  EXPECT_THAT(output.out, AllOf(HasSubstr("0.pcd: nothing found"), Not(HasSubstr("/1.pcd: "))));
+}
+
+TEST_F(Cli, RequestPrintsTheJsonLineThatDetectWouldSend) {
+  const Output output = run("request --model gear --unit mm --min-score 0 --scene", {file("a.pcd", "# a")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(server_.stream_count(), 0);
+  EXPECT_EQ(std::count(output.out.begin(), output.out.end(), '\n'), 1);
+  v1::DetectRequest request;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(output.out, &request).ok()) << output.out;
+  EXPECT_EQ(request.cloud().pcd(), "# a");
+  EXPECT_TRUE(request.params().has_min_score());
+  EXPECT_FALSE(request.params().has_max_results());
+}
+
+TEST_F(Cli, ModelsListsShowsAndDeletes) {
+  EXPECT_THAT(run("models").out, AllOf(HasSubstr("id"), HasSubstr("\nbolt"), HasSubstr("\ngear")));
+  EXPECT_THAT(run("model gear").out, AllOf(HasSubstr("gear"), HasSubstr("100.0 mm")));
+  EXPECT_EQ(run("delete gear").out, "deleted gear\n");
+  EXPECT_THAT(run("models --json").out, HasSubstr("\"id\":\"gear\""));
+}
+
+TEST_F(Cli, ServerOnTheCommandLineOverridesTheEnvironment) {
+  FakeServer other;
+  other.answer = one_part;
+  const Output output =
+      run("detect --server " + other.address() + " --model gear --unit mm --scene", {file("a.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_EQ(other.stream_count(), 1);
+  EXPECT_EQ(server_.stream_count(), 0);
+}
+
+}  // namespace
+}  // namespace binpose::client
