@@ -10,8 +10,9 @@
 namespace binpose {
 namespace {
 
-constexpr double kSmallestDiameter = 1e-4;
-constexpr double kLargestDiameter = 100;
+// Wide enough that a mesh in the wrong unit is trained, with a warning.
+constexpr double kSmallestDiameter = 1e-6;
+constexpr double kLargestDiameter = 1e4;
 /// Area over the square of the diameter, below which there is nothing to sample: a wire 3000 times as long as thick.
 constexpr double kLeastRelativeArea = 1e-3;
 /// Directions in which the outermost vertices are compared; about 6 degrees apart, which misses at most

@@ -15,7 +15,7 @@ struct MeshExtent {
 };
 
 /// OK, or INVALID_ARGUMENT saying why nothing can be trained from this mesh: no triangles, an index out of range, a
-/// coordinate that is not finite, next to no area, or an extent outside [0.1 mm, 100 m].
+/// coordinate that is not finite, next to no area, or an extent outside [1 um, 10 km].
 absl::Status check_mesh(const Mesh& mesh);
 
 /// Extent of a mesh that check_mesh() accepts.

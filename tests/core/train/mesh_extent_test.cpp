@@ -53,15 +53,15 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
   const Mesh speck = testing::box({1e-4F, 1e-4F, 1e-4F});
   const Mesh specks = testing::joined(speck, testing::shifted(speck, {5, 0, 0}));
   Mesh huge = good, tiny = good, overflowing = good;
-  for (Eigen::Vector3f& v : huge.vertices) v *= 1e4F;
-  for (Eigen::Vector3f& v : tiny.vertices) v *= 1e-4F;
+  for (Eigen::Vector3f& v : huge.vertices) v *= 1e6F;
+  for (Eigen::Vector3f& v : tiny.vertices) v *= 1e-6F;
   for (Eigen::Vector3f& v : overflowing.vertices) v *= 1e30F;
   const Refused cases[] = {{empty, "0 triangles"},
                            {bad_index, "triangle 3 refers to vertex 99; there are 8"},
                            {not_finite, "vertex 2 has a coordinate that is not a finite number"},
                            {flat, "degenerate"},
                            {specks, "a stray one lies far off"},
-                           {huge, "diameter of 1300 m"},
+                           {huge, "diameter of 130000 m"},
                            {tiny, "Check the unit"},
                            {overflowing, "Check the unit"}};
   EXPECT_TRUE(check_mesh(good).ok());
