@@ -1,0 +1,97 @@
+#include "server/durable_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "absl/strings/str_format.h"
+
+namespace binpose::server {
+namespace {
+
+absl::Status io_error(std::string_view action, const std::filesystem::path& path) {
+  return absl::InternalError(absl::StrFormat("Cannot %s %s: %s.", action, path.string(), std::strerror(errno)));
+}
+
+/// Closes a file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+bool write_all(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Makes renames and removals in a directory last.
+absl::Status sync_directory(const std::filesystem::path& directory) {
+  const Descriptor fd(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0 || ::fsync(fd.get()) != 0) return io_error("sync directory", directory);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status write_durably(const std::filesystem::path& directory, const std::string& name, std::string_view bytes) {
+  const std::filesystem::path target = directory / name;
+  std::string temporary = directory / ("." + name + ".XXXXXX");
+  const Descriptor fd(::mkostemp(temporary.data(), O_CLOEXEC));
+  if (fd.get() < 0) return io_error("create a temporary file for", target);
+  if (!write_all(fd.get(), bytes) || ::fchmod(fd.get(), 0644) != 0 || ::fsync(fd.get()) != 0 ||
+      ::rename(temporary.c_str(), target.c_str()) != 0) {
+    absl::Status failure = io_error("write", target);
+    ::unlink(temporary.c_str());
+    return failure;
+  }
+  return sync_directory(directory);
+}
+
+absl::Status remove_durably(const std::filesystem::path& directory, const std::string& name) {
+  const std::filesystem::path target = directory / name;
+  if (::unlink(target.c_str()) != 0 && errno != ENOENT) return io_error("remove", target);
+  return sync_directory(directory);
+}
+
+absl::StatusOr<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  // Non-blocking, so that a FIFO does not hold up the start.
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  struct stat info {};
+  if (fd.get() < 0 || ::fstat(fd.get(), &info) != 0) return io_error("open", path);
+  if (!S_ISREG(info.st_mode)) return absl::DataLossError(absl::StrFormat("%s is no regular file.", path.string()));
+  const auto size = static_cast<std::size_t>(info.st_size);
+  if (size > max_bytes) {
+    return absl::DataLossError(absl::StrFormat("%s has %d bytes; the limit is %d.", path.string(), size, max_bytes));
+  }
+  std::string bytes(size, '\0');
+  std::size_t filled = 0;
+  while (filled < size) {
+    const ssize_t count = ::read(fd.get(), bytes.data() + filled, size - filled);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return io_error("read", path);
+    if (count == 0) break;  // shrank meanwhile: the checksum will tell
+    filled += static_cast<std::size_t>(count);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+}  // namespace binpose::server

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "server/model_store.h"
+
+/// The bytes of a model file: what the server knows about a model, before the model itself as core/io/model_file.h
+/// writes it. One SHA-256 covers all of it. The ID is the file's name only, so that files can be copied and renamed.
+namespace binpose::server {
+
+/// Fills in content hash and size as well.
+std::string seal_envelope(StoredModel& stored);
+
+/// The model of such bytes.
+///
+/// @param bytes  hostile.
+/// Errors: DATA_LOSS (truncated, foreign, wrong checksum), UNIMPLEMENTED (a newer format version).
+absl::StatusOr<StoredModel> open_envelope(std::string_view id, std::string_view bytes);
+
+}  // namespace binpose::server

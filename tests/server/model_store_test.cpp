@@ -1,0 +1,172 @@
+#include "server/model_store.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "core/io/model_file.h"
+#include "core/io/read_mesh.h"
+#include "core/train/train.h"
+#include "tests/server/temporary_directory.h"
+#include "tests/server/test_part.h"
+
+namespace binpose::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// The L-shaped block, trained once.
+const Model& block() {
+  static const Model model = [] {
+    TrainParams params;
+    params.viewpoint_count = 64;
+    return train(read_mesh(l_block_stl(), MeshFormat::kStl, 0.001).value(), params, {}).value();
+  }();
+  return model;
+}
+
+std::unique_ptr<ModelStore> open_store(const std::filesystem::path& directory) {
+  auto store = ModelStore::open(directory);
+  EXPECT_TRUE(store.ok()) << store.status();
+  return *std::move(store);
+}
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write(const std::filesystem::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+class ModelStoreTest : public ::testing::Test {
+ protected:
+  const std::filesystem::path& path() const { return directory_.path(); }
+
+ private:
+  TemporaryDirectory directory_;
+};
+
+TEST_F(ModelStoreTest, GivesBackAfterReopeningWhatWasPut) {
+  const auto before = open_store(path())->put("block", block());
+  ASSERT_TRUE(before.ok());
+  const auto store = open_store(path());
+  EXPECT_EQ(store->skipped_files(), 0);
+  const auto after = store->find("block");
+  ASSERT_TRUE(after.ok());
+  EXPECT_EQ((*after)->generation, 1);
+  EXPECT_EQ((*after)->create_time, (*before)->create_time);
+  EXPECT_EQ((*after)->content_hash, content_hash(block()));
+  EXPECT_EQ((*after)->file_bytes, std::filesystem::file_size(path() / "block.model"));
+  EXPECT_EQ(content_hash((*after)->model), content_hash(block()));
+}
+
+TEST_F(ModelStoreTest, MakesTheDirectoryIfItIsMissing) {
+  EXPECT_TRUE(open_store(path() / "a" / "b")->put("block", block()).ok());
+  EXPECT_TRUE(std::filesystem::exists(path() / "a" / "b" / "block.model"));
+}
+
+TEST_F(ModelStoreTest, ADirectoryThatCannotBeHadIsAnErrorThatNamesIt) {
+  write(path() / "file", "");
+  const auto store = ModelStore::open(path() / "file");
+  EXPECT_EQ(store.status().code(), absl::StatusCode::kInternal);
+  EXPECT_THAT(std::string(store.status().message()), HasSubstr((path() / "file").string()));
+}
+
+TEST_F(ModelStoreTest, WhoHoldsAModelKeepsItWhenItIsReplacedOrRemoved) {
+  const auto store = open_store(path());
+  const auto held = store->put("block", block()).value();
+  EXPECT_EQ(store->put("block", block()).value()->generation, 2);
+  ASSERT_TRUE(store->remove("block").ok());
+  EXPECT_EQ(held->generation, 1);
+  EXPECT_EQ(content_hash(held->model), content_hash(block()));
+}
+
+TEST_F(ModelStoreTest, ARemovedModelIsGoneForGood) {
+  const auto store = open_store(path());
+  ASSERT_TRUE(store->put("block", block()).ok());
+  ASSERT_TRUE(store->remove("block").ok());
+  EXPECT_EQ(store->find("block").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(store->remove("block").code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(open_store(path())->size(), 0);
+}
+
+TEST_F(ModelStoreTest, ASaveThatFailsSaysWhyAndLeavesTheOldModelServed) {
+  const auto store = open_store(path() / "models");
+  ASSERT_TRUE(store->put("block", block()).ok());
+  std::filesystem::remove_all(path() / "models");
+  const auto replaced = store->put("block", block());
+  EXPECT_EQ(replaced.status().code(), absl::StatusCode::kInternal);
+  EXPECT_THAT(std::string(replaced.status().message()), HasSubstr("block.model: No such file"));
+  EXPECT_EQ(store->find("block").value()->generation, 1);
+}
+
+TEST_F(ModelStoreTest, IdsThatLookLikeTemporaryOrModelFilesClashWithNone) {
+  const std::vector<std::string> ids = {"x", "x.tmp", "x.model", "x.model.tmp", ".x", "-", "..."};
+  {
+    const auto store = open_store(path());
+    for (const std::string& id : ids) ASSERT_TRUE(store->put(id, block()).ok());
+  }
+  const auto store = open_store(path());
+  EXPECT_EQ(store->size(), ids.size());
+  for (const std::string& id : ids) EXPECT_TRUE(store->find(id).ok()) << id;
+}
+
+TEST_F(ModelStoreTest, SkipsAndCountsWhatIsNoModelAndDeletesNothing) {
+  ASSERT_TRUE(open_store(path())->put("good", block()).ok());
+  const std::string good = read(path() / "good.model");
+  write(path() / "torn.model", good.substr(0, good.size() / 2));
+  write(path() / "short.model", good.substr(0, 10));
+  write(path() / "empty.model", "");
+  write(path() / "foreign.model", std::string(1000, 'x'));
+  write(path() / "long.model", good + "x");
+  write(path() / "bad id.model", good);
+  write(path() / "notes.txt", "foreign");
+  write(path() / ".good.model.abc123", good.substr(0, 100));  // what a crash leaves behind
+  ASSERT_EQ(::mkfifo((path() / "fifo.model").c_str(), 0600), 0);
+  std::filesystem::create_directory(path() / "folder.model");
+  std::filesystem::create_directory(path() / "lost+found");
+  const auto store = open_store(path());
+  EXPECT_EQ(store->size(), 1);
+  EXPECT_TRUE(store->find("good").ok());
+  EXPECT_EQ(store->skipped_files(), 10);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path()), {}), 12);
+}
+
+TEST_F(ModelStoreTest, ABitFlippedAnywhereHidesThatModelAlone) {
+  ASSERT_TRUE(open_store(path())->put("good", block()).ok());
+  const std::string good = read(path() / "good.model");
+  constexpr std::size_t kHeader = 160;
+  for (std::size_t i = 0; i < good.size(); i += i < kHeader ? 1 : good.size() / 40) {
+    std::string bad = good;
+    bad[i] = static_cast<char>(bad[i] ^ 1);
+    write(path() / "bad.model", bad);
+    const auto store = open_store(path());
+    EXPECT_EQ(store->skipped_files(), 1) << "byte " << i;
+    EXPECT_TRUE(store->find("good").ok());
+  }
+}
+
+TEST_F(ModelStoreTest, AFileCanBeCopiedUnderAnotherId) {
+  ASSERT_TRUE(open_store(path())->put("block", block()).ok());
+  std::filesystem::copy(path() / "block.model", path() / "copy.model");
+  EXPECT_EQ(open_store(path())->find("copy").value()->id, "copy");
+}
+
+TEST(CheckModelId, TakesWhatTheRuleAllowsAndNothingElse) {
+  for (const std::string& id : {std::string("a"), std::string("A-z_0.9"), std::string(64, 'x'), std::string("...")}) {
+    EXPECT_TRUE(check_model_id("id", id).ok()) << id;
+  }
+  for (const std::string& id :
+       {std::string(), std::string("."), std::string(".."), std::string(65, 'x'), std::string("a/b"),
+        std::string("a b"), std::string("\xc3\xa4"), std::string(1, '\0')}) {
+    EXPECT_EQ(check_model_id("id", id).code(), absl::StatusCode::kInvalidArgument) << id;
+  }
+}
+
+}  // namespace
+}  // namespace binpose::server
