@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <climits>
+#include <cstdint>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "binpose/v1/types.pb.h"
+#include "core/geometry/pose.h"
+
+namespace binpose::server {
+
+/// The wire's unsigned count as core's int; what does not fit becomes the largest, which every range refuses.
+inline int saturate(std::uint32_t count) { return static_cast<int>(std::min<std::uint32_t>(count, INT_MAX)); }
+
+/// 1 or 0.001. Errors: INVALID_ARGUMENT (not said, or unknown), naming `field`.
+absl::StatusOr<double> metres_per_unit(std::string_view field, v1::LengthUnit unit);
+
+v1::Vector3 to_proto(const Eigen::Vector3d& vector);
+
+/// A pose whose position is in the unit given; the quaternion has unit length and w >= 0.
+v1::Pose to_proto(const Pose& pose, double metres_per_unit);
+
+}  // namespace binpose::server
