@@ -1,0 +1,112 @@
+#include "server/detection_service.h"
+
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "core/detect/detect.h"
+#include "server/clock.h"
+#include "server/convert_cloud.h"
+#include "server/convert_detection.h"
+#include "server/convert_geometry.h"
+#include "server/detection_limits.h"
+#include "server/frame_bytes.h"
+#include "server/status.h"
+
+namespace binpose::server {
+namespace {
+
+absl::Status check_request(const v1::DetectRequest& request) {
+  if (request.request_id().size() > kMaxRequestIdBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("request_id has %d bytes; the limit is %d.", request.request_id().size(), kMaxRequestIdBytes));
+  }
+  if (request.model_ids().empty() || request.model_ids_size() > kMaxModelsPerRequest) {
+    return absl::InvalidArgumentError(absl::StrFormat("model_ids has %d entries; it must have 1 to %d.",
+                                                      request.model_ids_size(), kMaxModelsPerRequest));
+  }
+  std::set<std::string> seen;
+  for (const std::string& id : request.model_ids()) {
+    if (absl::Status status = check_model_id("model_ids", id); !status.ok()) return status;
+    if (!seen.insert(id).second) {
+      return absl::InvalidArgumentError(absl::StrFormat("model_ids names '%s' twice; once is enough.", id));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::shared_ptr<const StoredModel>>> find_models(const v1::DetectRequest& request,
+                                                                            const ModelStore& models) {
+  std::vector<std::shared_ptr<const StoredModel>> found;
+  for (const std::string& id : request.model_ids()) {
+    absl::StatusOr<std::shared_ptr<const StoredModel>> model = models.find(id);
+    if (!model.ok()) return model.status();
+    found.push_back(*std::move(model));
+  }
+  return found;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, const ModelStore& models,
+                                              const RunControl& control) {
+  if (absl::Status status = check_request(request); !status.ok()) return status;
+  const auto stored = find_models(request, models);
+  if (!stored.ok()) return stored.status();
+  const absl::StatusOr<DetectParams> params = to_detect_params(request.params());
+  if (!params.ok()) return params.status();
+  const absl::StatusOr<PointCloud> cloud = to_cloud(request.cloud());
+  if (!cloud.ok()) return cloud.status();
+
+  std::vector<const Model*> wanted;
+  for (const auto& model : *stored) wanted.push_back(&model->model);
+  const absl::StatusOr<DetectResult> result = detect(*cloud, wanted, *params, control);
+  if (!result.ok()) return result.status();
+  return to_response(*result, request.model_ids(), *metres_per_unit("cloud.unit", request.cloud().unit()));
+}
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* DetectionService::Detect(
+    grpc::CallbackServerContext* context) {
+  return new DetectStream(*this, backend_.detections, backend_.drain, backend_.metrics.streams(),
+                          compute_deadline(context->deadline()));
+}
+
+grpc::ByteBuffer DetectionService::answer(grpc::ByteBuffer& frame, Clock::time_point arrival,
+                                          const RunControl& control) {
+  const double queue_seconds = seconds_since(arrival);
+  std::string request_id = request_id_of(frame);
+  const absl::StatusOr<v1::DetectResponse> found = contain_exceptions([&]() -> absl::StatusOr<v1::DetectResponse> {
+    if (control.stop.stop_requested()) return control.status();  // nobody waits: not worth decoding
+    const std::size_t bytes = frame.Length();
+    v1::DetectRequest request;
+    if (!decode(frame, request)) {
+      return absl::InvalidArgumentError(absl::StrFormat("The frame's %d bytes are no DetectRequest.", bytes));
+    }
+    request_id = request.request_id();
+    return find_parts(request, backend_.models, control);
+  });
+  v1::DetectResponse response;
+  if (found.ok()) {
+    response = *found;
+    response.mutable_stats()->set_queue_seconds(queue_seconds);
+    backend_.metrics.observe_detection(response.stats());
+  } else {
+    *response.mutable_error() = to_error(found.status());
+  }
+  response.set_request_id(request_id);
+  backend_.metrics.count_request(Method::kDetect, found.status().code(), seconds_since(arrival));
+  return encode(response);
+}
+
+grpc::ByteBuffer DetectionService::refuse(grpc::ByteBuffer& frame, const absl::Status& reason) {
+  v1::DetectResponse response;
+  response.set_request_id(request_id_of(frame));
+  *response.mutable_error() = to_error(reason);
+  backend_.metrics.count_request(Method::kDetect, reason.code(), 0);
+  return encode(response);
+}
+
+}  // namespace binpose::server

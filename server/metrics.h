@@ -1,0 +1,49 @@
+#pragma once
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+
+#include <array>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "binpose/v1/detection_service.pb.h"
+
+namespace binpose::server {
+
+/// The methods that are measured.
+enum class Method { kTrain, kGetModel, kListModels, kDeleteModel, kDetect };
+
+/// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
+class Metrics {
+ public:
+  Metrics();
+
+  /// Counts a call that has ended, or a frame of a Detect stream that is answered.
+  void count_request(Method method, absl::StatusCode code, double seconds);
+  /// Notes where a detection spent its time.
+  void observe_detection(const v1::DetectStats& stats);
+
+  prometheus::Gauge& models() { return models_; }
+  prometheus::Gauge& streams() { return streams_; }
+  prometheus::Counter& skipped_model_files() { return skipped_model_files_; }
+  std::shared_ptr<prometheus::Registry> registry() const { return registry_; }
+
+ private:
+  static constexpr int kMethods = 5;
+  static constexpr int kCodes = 17;
+  static constexpr int kStages = 6;
+
+  std::shared_ptr<prometheus::Registry> registry_ = std::make_shared<prometheus::Registry>();
+  std::array<std::array<prometheus::Counter*, kCodes>, kMethods> requests_;
+  std::array<prometheus::Histogram*, kMethods> request_seconds_;
+  std::array<prometheus::Histogram*, kStages> stage_seconds_;
+  prometheus::Histogram& queue_seconds_;
+  prometheus::Gauge& models_;
+  prometheus::Gauge& streams_;
+  prometheus::Counter& skipped_model_files_;
+};
+
+}  // namespace binpose::server

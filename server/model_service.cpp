@@ -1,0 +1,78 @@
+#include "server/model_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <string>
+
+#include "server/clock.h"
+#include "server/convert_training.h"
+#include "server/status.h"
+#include "server/train_call.h"
+
+namespace binpose::server {
+namespace {
+
+/// Ends a unary call and counts it.
+void finish(grpc::ServerUnaryReactor* reactor, Metrics& metrics, Method method, Clock::time_point arrival,
+            const absl::Status& status) {
+  metrics.count_request(method, status.code(), seconds_since(arrival));
+  reactor->Finish(to_grpc(status));
+}
+
+absl::Status get_model(const ModelStore& models, const std::string& id, v1::Model& response) {
+  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
+  const auto stored = models.find(id);
+  if (!stored.ok()) return stored.status();
+  response = to_proto(**stored);
+  return absl::OkStatus();
+}
+
+absl::Status delete_model(const Backend& backend, const std::string& id) {
+  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
+  if (absl::Status status = backend.models.remove(id); !status.ok()) return status;
+  backend.metrics.models().Set(static_cast<double>(backend.models.size()));
+  spdlog::info("deleted {}", id);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::TrainResponse>* ModelService::Train(grpc::CallbackServerContext* context,
+                                                                 const v1::TrainRequest* request) {
+  return new TrainCall(*request, backend_, compute_deadline(context->deadline()));
+}
+
+grpc::ServerUnaryReactor* ModelService::GetModel(grpc::CallbackServerContext* context,
+                                                 const v1::GetModelRequest* request, v1::Model* response) {
+  const Clock::time_point arrival = Clock::now();
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  finish(reactor, backend_.metrics, Method::kGetModel, arrival, get_model(backend_.models, request->id(), *response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* context,
+                                                   const v1::ListModelsRequest* /*request*/,
+                                                   v1::ListModelsResponse* response) {
+  const Clock::time_point arrival = Clock::now();
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  for (const auto& stored : backend_.models.list()) *response->add_models() = to_proto(*stored);
+  finish(reactor, backend_.metrics, Method::kListModels, arrival, absl::OkStatus());
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* ModelService::DeleteModel(grpc::CallbackServerContext* context,
+                                                    const v1::DeleteModelRequest* request,
+                                                    v1::DeleteModelResponse* /*response*/) {
+  const Clock::time_point arrival = Clock::now();
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const auto call = std::make_shared<Drain::Call>(backend_.drain);
+  // On the pool, because it waits for the disk.
+  const absl::Status admitted = backend_.detections.submit([this, call, reactor, arrival, id = request->id()] {
+    finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, delete_model(backend_, id));
+  });
+  if (!admitted.ok()) finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, admitted);
+  return reactor;
+}
+
+}  // namespace binpose::server

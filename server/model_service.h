@@ -1,0 +1,26 @@
+#pragma once
+
+#include "binpose/v1/model_service.grpc.pb.h"
+#include "server/backend.h"
+
+namespace binpose::server {
+
+/// binpose.v1.ModelService.
+class ModelService final : public v1::ModelService::CallbackService {
+ public:
+  explicit ModelService(const Backend& backend) : backend_(backend) {}
+
+  grpc::ServerWriteReactor<v1::TrainResponse>* Train(grpc::CallbackServerContext* context,
+                                                     const v1::TrainRequest* request) override;
+  grpc::ServerUnaryReactor* GetModel(grpc::CallbackServerContext* context, const v1::GetModelRequest* request,
+                                     v1::Model* response) override;
+  grpc::ServerUnaryReactor* ListModels(grpc::CallbackServerContext* context, const v1::ListModelsRequest* request,
+                                       v1::ListModelsResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteModel(grpc::CallbackServerContext* context, const v1::DeleteModelRequest* request,
+                                        v1::DeleteModelResponse* response) override;
+
+ private:
+  Backend backend_;
+};
+
+}  // namespace binpose::server

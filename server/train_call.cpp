@@ -1,0 +1,111 @@
+#include "server/train_call.h"
+
+#include <spdlog/spdlog.h>
+
+#include <string>
+#include <utility>
+
+#include "core/train/train.h"
+#include "server/convert_training.h"
+#include "server/status.h"
+
+namespace binpose::server {
+namespace {
+
+/// Share of the progress that core's part of the work takes.
+constexpr double kComputeShare = 0.95;
+
+}  // namespace
+
+TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, std::optional<Clock::time_point> deadline)
+    : request_(request), backend_(backend), deadline_(deadline), call_(backend.drain) {
+  if (const absl::Status admitted = admit(); !admitted.ok()) end(admitted);
+}
+
+absl::Status TrainCall::admit() {
+  if (backend_.drain.started()) return absl::UnavailableError(kEnding);
+  report(v1::TRAIN_STAGE_QUEUED, 0);
+  return backend_.trainings.submit([this] { run(); });
+}
+
+void TrainCall::OnWriteDone(bool /*ok*/) {
+  advance([this] { writing_ = false; });
+}
+
+void TrainCall::run() {
+  const absl::StatusOr<v1::Model> outcome = contain_exceptions([this] { return train_and_save(); });
+  if (outcome.ok()) {
+    spdlog::info("trained {} generation {} in {:.2f} s", outcome->id(), outcome->generation(), seconds_since(arrival_));
+  } else {
+    spdlog::warn("training failed: {}", std::string(outcome.status().message()));
+  }
+  end(outcome);
+}
+
+absl::StatusOr<v1::Model> TrainCall::train_and_save() {
+  if (absl::Status status = check_model_id("id", request_.id()); !status.ok()) return status;
+  const RunControl control = {.stop = stop_.get_token(), .deadline = deadline_};
+  if (absl::Status status = control.status(); !status.ok()) return status;
+  const absl::StatusOr<TrainParams> params = to_train_params(request_.params());
+  if (!params.ok()) return params.status();
+  report(v1::TRAIN_STAGE_READING_MESH, 0);
+  const absl::StatusOr<Mesh> mesh = to_mesh(request_.mesh());
+  if (!mesh.ok()) return mesh.status();
+
+  absl::StatusOr<Model> model = train(*mesh, *params, control, [this](TrainStage stage, double progress) {
+    report(to_proto(stage), kComputeShare * progress);
+  });
+  if (!model.ok()) return model.status();
+  if (absl::Status status = control.status(); !status.ok()) return status;
+  auto doubt = doubt_unit(model->diameter, request_.mesh().unit());
+  if (doubt) model->warnings.push_back(*std::move(doubt));
+  report(v1::TRAIN_STAGE_SAVING, kComputeShare);
+  const auto stored = backend_.models.put(request_.id(), *std::move(model));
+  if (!stored.ok()) return stored.status();
+  backend_.metrics.models().Set(static_cast<double>(backend_.models.size()));
+  return to_proto(**stored);
+}
+
+void TrainCall::report(v1::TrainStage stage, double progress) {
+  v1::TrainResponse response;
+  response.set_stage(stage);
+  response.set_progress(progress);
+  advance([&] { pending_ = std::move(response); });
+}
+
+void TrainCall::end(const absl::StatusOr<v1::Model>& outcome) {
+  backend_.metrics.count_request(Method::kTrain, outcome.status().code(), seconds_since(arrival_));
+  advance([&] {
+    if (outcome.ok()) {
+      pending_.emplace();
+      pending_->set_stage(v1::TRAIN_STAGE_DONE);
+      pending_->set_progress(1);
+      *pending_->mutable_model() = *outcome;
+    }
+    end_ = to_grpc(outcome.status());
+  });
+}
+
+/// Makes a change and starts what it has made possible. The last action of whoever calls: once the lock is open,
+/// another thread may end the call, and this is gone.
+template <class Change>
+void TrainCall::advance(Change change) {
+  bool write = false;
+  bool finish = false;
+  {
+    const std::lock_guard lock(mutex_);
+    change();
+    if (writing_ || finished_) return;
+    if (pending_) {
+      write = writing_ = true;
+      outgoing_ = *std::move(pending_);
+      pending_.reset();
+    } else if (end_) {
+      finish = finished_ = true;
+    }
+  }
+  if (write) StartWrite(&outgoing_);
+  if (finish) Finish(*end_);
+}
+
+}  // namespace binpose::server
