@@ -198,6 +198,16 @@ bool sound(const std::vector<std::vector<ContourPoint>>& outlines) {
                      [](const std::vector<ContourPoint>& outline) { return sound(outline); });
 }
 
+bool sound(const std::vector<float>& weights) {
+  return std::all_of(weights.begin(), weights.end(), [](float weight) { return std::isfinite(weight) && weight >= 0; });
+}
+
+bool sound(const Symmetry& symmetry) {
+  return !symmetry.discrete.empty() && symmetry.axis_point.allFinite() && symmetry.axis_direction.allFinite() &&
+         std::all_of(symmetry.discrete.begin(), symmetry.discrete.end(),
+                     [](const Pose& pose) { return pose.matrix().allFinite(); });
+}
+
 /// What derive() and detection rely on.
 bool invariants_hold(const Model& model) {
   const std::size_t points = model.pair_points.size(), scales = model.params.pair_lengths.size();
@@ -213,10 +223,8 @@ bool invariants_hold(const Model& model) {
                        return pair.a < model.contour_points.size() && pair.b < model.contour_points.size() &&
                               pair.a != pair.b;
                      }) &&
-         model.pair_weights.size() == model.pairs.size() && !model.symmetry.discrete.empty() &&
-         std::all_of(model.pair_weights.begin(), model.pair_weights.end(),
-                     [](float weight) { return std::isfinite(weight) && weight >= 0; }) &&
-         std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
+         model.pair_weights.size() == model.pairs.size() && sound(model.pair_weights) && sound(model.contour_weights) &&
+         sound(model.symmetry) && std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
            return pair.p < points && pair.q1 < points && pair.q2 < points && pair.p != pair.q1 && pair.p != pair.q2 &&
                   pair.q1 != pair.q2 && pair.scale < scales;
          });

@@ -1,5 +1,7 @@
 #include "tests/support/scan_map.h"
 
+#include <algorithm>
+
 #include "core/geometry/contours.h"
 #include "core/geometry/normals.h"
 #include "core/train/train.h"
@@ -13,7 +15,8 @@ Model quick_model(const Mesh& mesh) {
 }
 
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
-  DepthMap map = depth_map(sensor_view(render(bodies, sensor)).value(), 0.014 * diameter);
+  const SensorView view = sensor_view(render(bodies, sensor)).value();
+  DepthMap map = depth_map(view, std::max(0.014 * diameter, 1.2 * view.spacing));
   estimate_normals(map, 1, 1);
   find_contours(map, static_cast<float>(0.03 * diameter), Unmeasured::kUnknown, 1);
   return map;

@@ -142,6 +142,13 @@ TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   for (const Vector3f& normal : sparse.normals) EXPECT_TRUE(normal.isZero());
 }
 
+TEST(Normals, TellTheNoiseOfTheSensor) {
+  const testing::PlacedMesh block = placed(testing::box({0.08F, 0.08F, 0.05F}), {0, 0, 0.45}, 20);
+  EXPECT_LT(map_of({&block, 1}, 0.5).noise, 1e-5F);
+  // Of several points in a pixel the nearest is kept, which quietens a little.
+  for (const double noise : {1e-4, 4e-4}) EXPECT_NEAR(map_of({&block, 1}, 0.5, noise).noise, noise, 0.25 * noise);
+}
+
 TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
   const DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);

@@ -1,0 +1,98 @@
+#include "core/detect/rank.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/scan_map.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Two equal parts side by side.
+struct Scene {
+  Model model;
+  Pose poses[2];
+  DepthMap map;
+  std::vector<VerifyOptions> options;
+
+  Scene(const Mesh& mesh, const Pose& first, const Pose& second)
+      : model(testing::quick_model(mesh)), poses{first, second} {
+    const testing::PlacedMesh bodies[] = {{mesh, first}, {mesh, second}};
+    map = testing::scan_map(bodies, {}, model.diameter);
+    VerifyOptions verification;
+    verification.tolerance = static_cast<float>(0.012 * model.diameter);
+    options = {verification};
+  }
+  Candidate candidate(const Pose& T_scene_model) const {
+    Candidate c;
+    c.T_view_model = testing::in_view(map, T_scene_model);
+    c.evidence = verify(map, model, c.T_view_model, options[0]);
+    return c;
+  }
+  std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
+    const Model* models[] = {&model};
+    return rank(map, models, options, std::move(candidates), min_score);
+  }
+  bool is_at(const Candidate& c, const Pose& pose) const {
+    const Eigen::Vector3f centre = model.centre.cast<float>();
+    return (c.T_view_model * centre - testing::in_view(map, pose) * centre).norm() < 0.05 * model.diameter;
+  }
+};
+
+Scene blocks() {
+  return {testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {-0.07, 0, 0.43}),
+          testing::pose(-35, {1, 0.2, 0.6}, {0.06, -0.01, 0.43})};
+}
+
+Pose shifted(const Pose& pose, double x) { return Eigen::Translation3d(x, 0, 0) * pose; }
+
+TEST(Rank, KeepsOneOfEachInstanceBestFirst) {
+  const Scene scene = blocks();
+  std::vector<Candidate> candidates;
+  for (const double x : {0.0006, -0.0006, 0.0, 0.001, -0.001}) {
+    for (const Pose& pose : scene.poses) candidates.push_back(scene.candidate(shifted(pose, x)));
+  }
+  const std::vector<Candidate> kept = scene.ranked(candidates, 0.3);
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_GE(kept[0].evidence.score(), kept[1].evidence.score());
+  EXPECT_NE(scene.is_at(kept[0], scene.poses[0]), scene.is_at(kept[1], scene.poses[0]));
+  EXPECT_NE(scene.is_at(kept[0], scene.poses[1]), scene.is_at(kept[1], scene.poses[1]));
+}
+
+TEST(Rank, SuppressesTheTurnsOfASymmetricPart) {
+  const Scene scene(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {-0.05, 0, 0.494}),
+                    testing::pose(20, {1, 0, 3}, {0.05, 0, 0.48}));
+  std::vector<Candidate> candidates;
+  for (const Pose& pose : scene.poses) {
+    for (int turn = 0; turn < 6; ++turn) {
+      const Pose about_axis = testing::pose(60 * turn, Vector3d::UnitZ(), Vector3d::Zero());
+      candidates.push_back(scene.candidate(pose * about_axis));
+      candidates.push_back(
+          scene.candidate(pose * about_axis * testing::pose(180, Vector3d::UnitX(), Vector3d::Zero())));
+    }
+  }
+  EXPECT_EQ(scene.ranked(candidates, 0.3).size(), 2u);
+}
+
+TEST(Rank, DropsWhatScoresTooLittle) {
+  const Scene scene = blocks();
+  const Candidate good = scene.candidate(scene.poses[0]), bad = scene.candidate(shifted(scene.poses[1], 0.03));
+  ASSERT_LT(bad.evidence.score(), 0.3F);
+  EXPECT_EQ(scene.ranked({bad, good}, 0.3).size(), 1u);
+  EXPECT_TRUE(scene.ranked({bad}, 0.3).empty());
+  EXPECT_TRUE(scene.ranked({}, 0.3).empty());
+}
+
+TEST(Rank, OfEqualScoresKeepsTheOrderOfTheList) {
+  const Scene scene = blocks();
+  std::vector<Candidate> candidates(3, scene.candidate(scene.poses[0]));
+  for (int i = 0; i < 3; ++i) candidates[i].votes = static_cast<float>(i);
+  const std::vector<Candidate> kept = scene.ranked(candidates, 0.3);
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept[0].votes, 0);
+}
+
+}  // namespace
+}  // namespace binpose

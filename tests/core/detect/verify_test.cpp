@@ -1,0 +1,170 @@
+#include "core/detect/verify.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/scan_map.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A part scanned at a pose, perhaps with something in front of it.
+struct Scan {
+  Model model;
+  Pose T_scene_model;
+  std::vector<testing::PlacedMesh> bodies;
+  DepthMap map;
+
+  Scan(const Mesh& mesh, const Pose& pose, std::vector<testing::PlacedMesh> others = {})
+      : model(testing::quick_model(mesh)), T_scene_model(pose), bodies(std::move(others)) {
+    bodies.push_back({mesh, pose});
+    map = testing::scan_map(bodies, {}, model.diameter);
+  }
+  VerifyOptions options() const {
+    VerifyOptions options;
+    options.tolerance = static_cast<float>(0.012 * model.diameter);
+    return options;
+  }
+  Evidence evidence(const Pose& T_scene_model) const {
+    return verify(map, model, testing::in_view(map, T_scene_model), options());
+  }
+  /// The true pose, moved in the scene by shares of the diameter.
+  Pose moved(const Vector3d& by) const {
+    Pose T = T_scene_model;
+    T.pretranslate(model.diameter * by);
+    return T;
+  }
+};
+
+const Pose kLying = testing::pose(30, Vector3d::UnitZ(), {0, -0.01, 0.4875});  // flat on the floor at 0.5 m
+const Pose kTilted = testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43});
+
+TEST(Verify, ExplainsNearlyAllAtTheTruth) {
+  for (const Pose& pose : {kLying, kTilted}) {
+    const Scan scan(testing::l_block(), pose);
+    const Evidence evidence = scan.evidence(pose);
+    EXPECT_GT(evidence.explained, 0.9F);
+    EXPECT_LT(evidence.violated, 0.04F);
+    EXPECT_LT(evidence.occluded, 0.02F);
+    EXPECT_GT(evidence.outline_confirmed, 5 * evidence.outline_contradicted);
+    EXPECT_GT(evidence.score(), 0.75F);
+    EXPECT_LT(evidence.residual, 0.003 * scan.model.diameter);
+  }
+}
+
+TEST(Verify, SharesAddUpToAtMostAll) {
+  const Scan scan(testing::l_block(), kTilted);
+  for (const double by : {0.0, 0.05, 0.2, 0.5, -0.1}) {
+    const Evidence e = scan.evidence(scan.moved({by, by / 2, by / 3}));
+    EXPECT_LE(e.explained + e.violated + e.occluded + e.unexplained, 1.001F);
+    EXPECT_LE(e.outline_confirmed + e.outline_contradicted, 1.001F);
+    EXPECT_GE(e.score(), 0);
+    EXPECT_LE(e.score(), 1);
+  }
+}
+
+TEST(Verify, ScoresAShiftedPoseFarBelowTheTruth) {
+  const Scan scan(testing::l_block(), kTilted);
+  const float truth = scan.evidence(scan.T_scene_model).score();
+  for (const Vector3d& by : {Vector3d(0.15, 0, 0), Vector3d(0, -0.15, 0), Vector3d(0, 0, 0.1), Vector3d(0, 0, -0.1)}) {
+    EXPECT_LT(scan.evidence(scan.moved(by)).score(), 0.4F * truth) << by.transpose();
+  }
+}
+
+TEST(Verify, CallsAPoseInFrontOfTheSceneViolatedAndOneBehindItOccluded) {
+  const Scan scan(testing::l_block(), kLying);
+  const Evidence front = scan.evidence(scan.moved({0, 0, -0.15}));
+  EXPECT_GT(front.violated, 0.9F);
+  EXPECT_EQ(front.score(), 0);
+  const Evidence behind = scan.evidence(scan.moved({0, 0, 0.15}));
+  EXPECT_GT(behind.occluded, 0.9F);
+  EXPECT_LT(behind.score(), 0.05F);
+}
+
+TEST(Verify, CallsWhatLiesUnderAnotherPartOccluded) {
+  const Scan scan(testing::l_block(), kLying,
+                  {{testing::box({0.2F, 0.05F, 0.01F}), testing::pose(0, Vector3d::UnitZ(), {0, 0.03, 0.42})}});
+  // The share that rays to the visible points do not reach.
+  double hidden = 0, all = 0;
+  const Eigen::Isometry3f T_view_model = testing::in_view(scan.map, kLying);
+  for (const std::uint16_t i : visible_points(scan.model, T_view_model)) {
+    const Vector3d p = kLying * scan.model.surface[i].position.cast<double>();
+    const Vector3d normal = kLying.linear() * scan.model.surface[i].normal.cast<double>();
+    const double weight = -normal.dot(p.normalized());
+    if (weight < 0.26) continue;
+    const auto hit = testing::cast_ray(scan.bodies, Vector3d::Zero(), p);
+    all += weight;
+    hidden += hit && hit->body == 0 ? weight : 0;
+  }
+  ASSERT_GT(hidden / all, 0.2);
+  const Evidence evidence = scan.evidence(kLying);
+  EXPECT_NEAR(evidence.occluded, hidden / all, 0.05);
+  EXPECT_NEAR(evidence.explained, 1 - hidden / all, 0.08);
+  EXPECT_LT(evidence.violated, 0.02F);
+}
+
+TEST(Verify, DoesNotFallForAFlatFacePosedInsideALargerOne) {
+  // Top face at the height of the floor: every point is there, but the surface goes on at its rim.
+  const Scan scan(testing::hexagon(), testing::pose(0, Vector3d::UnitZ(), {0.04, 0, 0.494}));
+  const Pose in_floor = testing::pose(10, Vector3d::UnitZ(), {-0.04, 0, 0.506});
+  const Evidence evidence = scan.evidence(in_floor);
+  EXPECT_GT(evidence.explained, 0.9F);
+  EXPECT_GT(evidence.outline_contradicted, 0.8F);
+  EXPECT_LT(evidence.score(), 0.1F);
+  EXPECT_GT(scan.evidence(scan.T_scene_model).score(), 0.7F);
+}
+
+TEST(Verify, LeavesOwnedPixelsUnexplained) {
+  const Scan scan(testing::l_block(), kTilted);
+  const std::vector<int> all(scan.map.points.size(), 0), none(scan.map.points.size(), -1);
+  const Eigen::Isometry3f T = testing::in_view(scan.map, kTilted);
+  EXPECT_EQ(verify(scan.map, scan.model, T, scan.options(), &all).explained, 0);
+  EXPECT_EQ(verify(scan.map, scan.model, T, scan.options(), &none).explained, scan.evidence(kTilted).explained);
+}
+
+TEST(Verify, ExplainsNothingByTheBackground) {
+  Scan scan(testing::l_block(), kTilted);
+  scan.map.background.assign(scan.map.points.size(), 1);
+  EXPECT_EQ(scan.evidence(kTilted).explained, 0);
+}
+
+TEST(Verify, OfFewPointsIsCloseToThatOfAll) {
+  const Scan scan(testing::l_block(), kTilted);
+  VerifyOptions few = scan.options();
+  few.most_points = 80;
+  for (const double by : {0.0, 0.03, 0.06}) {
+    const Pose T = scan.moved({by, 0, 0});
+    EXPECT_NEAR(verify(scan.map, scan.model, testing::in_view(scan.map, T), few).explained, scan.evidence(T).explained,
+                0.12);
+  }
+}
+
+TEST(Verify, OfPosesOutOfSightIsNoEvidence) {
+  const Scan scan(testing::l_block(), kTilted);
+  for (const Vector3d& at : {Vector3d(0, 0, -0.5), Vector3d(5, 0, 0.5), Vector3d(0, 0, 0), Vector3d(1e30, 0, 1e30)}) {
+    EXPECT_LT(scan.evidence(testing::pose(0, Vector3d::UnitZ(), at)).score(), 0.01F) << at.transpose();
+  }
+}
+
+TEST(AlignmentScore, IsOneLessTheMeanDistanceOverTheCutoff) {
+  const Scan scan(testing::l_block(), kLying);
+  const auto cutoff = static_cast<float>(0.1 * scan.model.diameter);
+  const auto score = [&](const Pose& T) {
+    return alignment_score(scan.map, scan.model, testing::in_view(scan.map, T), cutoff);
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i < 500; ++i) {
+    const Eigen::Vector3f p = testing::in_view(scan.map, kLying) * scan.model.surface[i].position;
+    sum += std::min(cutoff, (scan.map.points[scan.map.pixel_of(p)] - p).norm()) / cutoff;
+  }
+  EXPECT_NEAR(score(kLying), 1 - sum / 500, 1e-4);
+  EXPECT_NEAR(score(scan.moved({0, 0, -0.9})), 0, 1e-4F);
+}
+
+}  // namespace
+}  // namespace binpose
