@@ -24,9 +24,9 @@ struct ContourPoint {
 struct DepthMap {
   Pose T_scene_view = Pose::Identity();
   int width = 0, height = 0;
-  float focal = 1;                       ///< pixels, both axes
-  float cx = 0, cy = 0;                  ///< principal point, pixels; (0, 0) = centre of the first pixel
-  float pixel_size = 0;                  ///< metres that a pixel spans across the view at the median depth
+  float focal = 1;       ///< pixels, both axes
+  float cx = 0, cy = 0;  ///< principal point, pixels; (0, 0) = centre of the first pixel
+  float pixel_size = 0;  ///< metres that a pixel spans across the view at the median depth
   float noise = 0;       ///< standard deviation of the measurement along the surface normal, metres; 0: not known
   std::vector<Eigen::Vector3f> points;   ///< row by row, view frame; z = 0: nothing measured
   std::vector<Eigen::Vector3f> normals;  ///< unit, towards the sensor; zero: none
