@@ -14,7 +14,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers go over the wire as they lie in memory");
 
-/// Of the file at `path`: what it says, prefixed to an error about its content.
+/// The error with the name of the file that it is about.
 absl::Status about(const std::filesystem::path& path, const absl::Status& status) {
   return {status.code(), path.string() + ": " + std::string(status.message())};
 }
