@@ -221,6 +221,7 @@ TEST_F(Cli, AnUnreadableSceneExitsWith3AndTheOthersGoOn) {
 TEST_F(Cli, ABrokenStreamExitsWith1AndSaysWhy) {
   server_.answers_before_end = 1;
   std::vector<std::string> scenes;
+  scenes.reserve(20);
   for (int i = 0; i < 20; ++i) scenes.push_back(file(std::to_string(i) + ".pcd", "#"));
   const Output output = run("detect --model gear --unit mm --scene", scenes);
   EXPECT_EQ(output.exit_code, 1);
