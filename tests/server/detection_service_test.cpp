@@ -72,8 +72,8 @@ TEST_F(DetectionServiceTest, SearchesForSeveralModelsInOneRequest) {
 }
 
 TEST_F(DetectionServiceTest, AnswersManyFramesInOrderWithTheirIds) {
-  std::vector<v1::DetectRequest> requests;
-  for (int i = 0; i < 12; ++i) requests.push_back(detect_request(absl::StrCat("frame ", i), "block"));
+  std::vector<v1::DetectRequest> requests(12, detect_request("", "block"));
+  for (std::size_t i = 0; i < requests.size(); ++i) requests[i].set_request_id(absl::StrCat("frame ", i));
   const auto answers = server().detect(requests);
   ASSERT_EQ(answers.size(), requests.size());
   for (std::size_t i = 0; i < answers.size(); ++i) EXPECT_EQ(answers[i].request_id(), requests[i].request_id());
@@ -156,7 +156,7 @@ struct BadFrame {
   std::vector<const char*> says;
 };
 
-void PrintTo(const BadFrame& bad, std::ostream* out) { *out << bad.name; }
+std::ostream& operator<<(std::ostream& out, const BadFrame& bad) { return out << bad.name; }
 
 class RefusesFrameTest : public DetectionServiceTest, public ::testing::WithParamInterface<BadFrame> {};
 

@@ -190,7 +190,7 @@ struct BadTraining {
   std::vector<const char*> says;
 };
 
-void PrintTo(const BadTraining& bad, std::ostream* out) { *out << bad.name; }
+std::ostream& operator<<(std::ostream& out, const BadTraining& bad) { return out << bad.name; }
 
 class RefusesTrainingTest : public ModelServiceTest, public ::testing::WithParamInterface<BadTraining> {};
 

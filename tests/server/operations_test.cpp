@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <fstream>
 #include <map>
 #include <optional>
@@ -158,8 +159,7 @@ TEST_F(MetricsTest, CountTheModelFilesThatWereSkipped) {
 
 TEST_F(MetricsTest, AreServedWhileOtherSocketsStaySilent) {
   start();
-  std::vector<int> sockets;
-  for (int i = 0; i < 3; ++i) sockets.push_back(connect_to(address()));
+  const std::array<int, 3> sockets = {connect_to(address()), connect_to(address()), connect_to(address())};
   expect_lines({"200 OK"});
   for (const int socket : sockets) ::close(socket);
 }

@@ -79,13 +79,15 @@ v1::PointCloud block_scan() {
   constexpr int kWidth = 320;
   constexpr int kHeight = 240;
   constexpr double kFocal = 600;
+  constexpr double kCentreColumn = 160;
+  constexpr double kCentreRow = 120;
   const Eigen::Isometry3d T_scene_model =
       Eigen::Translation3d(-20, -15, 400) * Eigen::AngleAxisd(1.5, Eigen::Vector3d(1, 0.7, 0.3).normalized());
   const Eigen::Isometry3d T_model_scene = T_scene_model.inverse();
   std::string pixels;
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
-      const Eigen::Vector3d ray((u - kWidth / 2) / kFocal, (v - kHeight / 2) / kFocal, 1);
+      const Eigen::Vector3d ray((u - kCentreColumn) / kFocal, (v - kCentreRow) / kFocal, 1);
       auto depth = std::numeric_limits<float>::quiet_NaN();
       for (const Box& box : kBoxes) {
         const auto distance = hit(box, T_model_scene.translation(), T_model_scene.linear() * ray);
@@ -102,8 +104,8 @@ v1::PointCloud block_scan() {
   image.set_float32(pixels);
   image.mutable_intrinsics()->set_fx(kFocal);
   image.mutable_intrinsics()->set_fy(kFocal);
-  image.mutable_intrinsics()->set_cx(kWidth / 2);
-  image.mutable_intrinsics()->set_cy(kHeight / 2);
+  image.mutable_intrinsics()->set_cx(kCentreColumn);
+  image.mutable_intrinsics()->set_cy(kCentreRow);
   return cloud;
 }
 
