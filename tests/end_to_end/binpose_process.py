@@ -1,0 +1,40 @@
+"""The two binaries as processes: a server of its own per test case, and the command-line client talking to it."""
+
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+BIN = Path(os.environ["BINPOSE_BIN"])  # set by ctest: where the build put its binaries
+
+
+class Server:
+    """binpose-server on free ports; `address` and `metrics` are where it listens."""
+
+    def __init__(self, model_dir):
+        self._process = subprocess.Popen(
+            [BIN / "binpose-server", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0", "--model-dir", model_dir,
+             "--threads", "1"],
+            stdout=subprocess.PIPE, text=True)
+        first_line = self._process.stdout.readline()  # "listening on HOST:PORT, metrics on HOST:PORT"
+        self.address, self.metrics = (part.split(" on ")[1] for part in first_line.strip().split(", "))
+
+    def stop(self):
+        """Ends it as systemd or Docker would; returns the exit status."""
+        self._process.send_signal(signal.SIGTERM)
+        status = self._process.wait(timeout=60)
+        self._process.stdout.close()
+        return status
+
+    def binpose(self, *arguments):
+        """Runs the client; returns the finished process with its output as text."""
+        return subprocess.run([BIN / "binpose", *arguments, "--server", self.address], capture_output=True, text=True,
+                              timeout=120)
+
+    def binpose_json(self, *arguments):
+        """The objects that `binpose ... --json` prints, one a line; the command must succeed."""
+        run = self.binpose(*arguments, "--json")
+        if run.returncode != 0:
+            raise AssertionError(f"binpose {' '.join(map(str, arguments))} failed: {run.stderr}")
+        return [json.loads(line) for line in run.stdout.splitlines()]
