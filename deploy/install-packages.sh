@@ -9,7 +9,8 @@ packages="cmake g++ ninja-build
 case "${1:-}" in
   build) ;;
   test)
-    packages="$packages clang-format clang-tidy libgmock-dev libgtest-dev libpcl-dev python3"
+    packages="$packages clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev
+      nlohmann-json3-dev pkgconf python3 shellcheck"
     # Node.js from elsewhere brings its own npm and conflicts with Debian's.
     command -v npm >/dev/null || packages="$packages npm ca-certificates"
     ;;
