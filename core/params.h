@@ -57,11 +57,12 @@ struct DetectParams {
   double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
+  int cluster_limit = 1000;  ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
   bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement
   bool refine = true;        ///< point-to-plane, after clustering
   Verification verification = Verification::kVisibleSurface;
 
-  /// The paper's settings: no gate, no contours, no refinement, all model points compared.
+  /// The paper's settings: no gate, few clusters, no contours, no refinement, all model points compared.
   static DetectParams paper();
 
   bool operator==(const DetectParams&) const = default;

@@ -26,7 +26,6 @@ constexpr float kLastGate = 0.025F;
 
 constexpr int kCoarsePoints = 80;
 constexpr int kClustersPerNeighbourhood = 20;
-constexpr int kMostClusters = 1000;
 constexpr int kRefinedPerNeighbourhood = 4;
 constexpr int kMostRefined = 200;
 constexpr int kMiddlePoints = 300;
@@ -80,7 +79,7 @@ Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams&
 
 /// Clusters of votes that stand a coarse verification: where the model may be, best first.
 std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, const Model& model, int model_index,
-                                       const RunControl& control, DetectStats& stats) {
+                                       const DetectParams& params, const RunControl& control, DetectStats& stats) {
   const auto diameter = static_cast<float>(model.diameter);
   stats.scene_pair_count += votes.scene_pairs;
   stats.vote_count += votes.votes.size();
@@ -91,7 +90,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
     options.radius = kClusterRadius * diameter;
     options.neighbourhood = kNeighbourhood * diameter;
     options.most_per_neighbourhood = kClustersPerNeighbourhood;
-    options.most = kMostClusters;
+    options.most = params.cluster_limit;
     for (const PoseCluster& c : cluster(votes.votes, options)) {
       candidates.push_back({model_index, pose_of(c, model), c.votes, {}, {}});
     }
@@ -171,8 +170,8 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
     if (params.use_contours) by_contour = contour_votes(map, model, control);
   }
   // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
-  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, control, stats);
-  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, control, stats);
+  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, params, control, stats);
+  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, params, control, stats);
   candidates.insert(candidates.end(), more.begin(), more.end());
   if (params.refine) candidates = refine_to_the_end(map, model, std::move(candidates), control, stats);
   if (params.verification == Verification::kAllPoints) {
