@@ -1,21 +1,25 @@
 #!/bin/sh
 # Installs the Debian 12 packages that are missing, and nothing when none is. The one list of what binpose needs.
-# Usage: install-packages.sh build|test
+# Usage: install-packages.sh run|build|test
 set -eu
 
-packages="cmake g++ ninja-build
+run="libabsl20220623 libgrpc++1.51 liblzf1 libpng16-16 libprometheus-cpp-core1.0 libprometheus-cpp-pull1.0
+  libprotobuf32 libspdlog1.10 libssl3 libtbb12"
+build="cmake g++ ninja-build
   libabsl-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
+test="clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev
+  pkgconf python3 shellcheck"
 case "${1:-}" in
-  build) ;;
+  run) packages=$run ;;
+  build) packages=$build ;;
   test)
-    packages="$packages clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev
-      nlohmann-json3-dev pkgconf python3 shellcheck"
+    packages="$build $test"
     # Node.js from elsewhere brings its own npm and conflicts with Debian's.
     command -v npm >/dev/null || packages="$packages npm ca-certificates"
     ;;
   *)
-    echo "Usage: $0 build|test" >&2
+    echo "Usage: $0 run|build|test" >&2
     exit 2
     ;;
 esac

@@ -51,7 +51,6 @@ class QuickstartTest(unittest.TestCase):
         [answer] = self.server.binpose_json("detect", "--model", "part", "--scene", SCENE, "--unit", "mm")
         best = answer["hypotheses"][0]
         self.assertEqual(best["modelId"], "part")
-        self.assertGreaterEqual(best["score"], 0.4)
         centre = centre_of(self.model)
         truth = json.loads((SCENE / "gt.json").read_text())["instances"]
         error = min(math.dist(moved(best["pose"], centre), moved_by_matrix(instance["pose"], centre))
