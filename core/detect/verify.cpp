@@ -122,8 +122,9 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
   }
   evidence.residual = evidence.explained > 0 ? std::sqrt(sum_sq / evidence.explained) : 0;
   const float scale = 1 / std::max(total, 1e-6F);
-  for (float* share : {&evidence.explained, &evidence.violated, &evidence.occluded, &evidence.unexplained})
+  for (float* share : {&evidence.explained, &evidence.violated, &evidence.occluded, &evidence.unexplained}) {
     *share *= scale;
+  }
   check_outline(map, model.outlines[viewpoint], T_view_model, options, evidence);
   return evidence;
 }

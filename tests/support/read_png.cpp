@@ -9,8 +9,9 @@ namespace binpose::testing {
 std::vector<std::uint16_t> read_png16(const std::filesystem::path& path, std::size_t count) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;
-  if (!png_image_begin_read_from_file(&image, path.c_str()))
+  if (!png_image_begin_read_from_file(&image, path.c_str())) {
     throw std::runtime_error(path.string() + ": " + image.message);
+  }
   // Linear 16-bit grey is the one simplified format that hands depth values over unchanged.
   image.format = PNG_FORMAT_LINEAR_Y;
   if (static_cast<std::size_t>(image.width) * image.height != count) {
