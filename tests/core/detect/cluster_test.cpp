@@ -52,7 +52,8 @@ struct Groups {
   explicit Groups(std::uint64_t seed, int noise) {
     scenes::Random random(seed);
     for (int i = 0; i < 4; ++i) {
-      centres.emplace_back(0.1F * static_cast<float>(i / 2) + static_cast<float>(random.uniform(0, 0.02)), 0.07F, 0.5F);
+      const double x = (i < 2 ? 0 : 0.1) + random.uniform(0, 0.02);
+      centres.emplace_back(static_cast<float>(x), 0.07F, 0.5F);
       rotations.push_back(random.rotation().cast<float>());
       add_group(random, centres[i], rotations[i], kCounts[i], votes);
     }

@@ -168,7 +168,8 @@ TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
   params.min_score = 1;
   EXPECT_TRUE(search(cloud, model, params)->hypotheses.empty());
   params.min_score = 0.6;
-  for (const PoseHypothesis& h : search(cloud, model, params)->hypotheses) EXPECT_GE(h.score, 0.6);
+  const DetectResult result = *search(cloud, model, params);
+  for (const PoseHypothesis& h : result.hypotheses) EXPECT_GE(h.score, 0.6);
 }
 
 TEST(Detect, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
