@@ -68,8 +68,9 @@ const ContourPoint* matching_contour(const DepthMap& map, const Eigen::Vector3f&
     const int pixel = q.z() > 0 ? map.pixel_of(q) : -1;
     if (pixel < 0 || map.contour_at[pixel] < 0) continue;
     const ContourPoint& contour = map.contours[map.contour_at[pixel]];
-    if (contour.outward.dot(outward) > kOutwardCosine && std::abs(normal.dot(contour.position - p)) < gate)
+    if (contour.outward.dot(outward) > kOutwardCosine && std::abs(normal.dot(contour.position - p)) < gate) {
       return &contour;
+    }
   }
   return nullptr;
 }

@@ -17,8 +17,9 @@ bool ends(const DepthMap& map, int u, int v, const int (&direction)[2], float st
     const int column = u + k * direction[0], row = v + k * direction[1];
     if (column < 0 || row < 0 || column >= map.width || row >= map.height) break;
     const int j = row * map.width + column;
-    if (map.measured(j))
+    if (map.measured(j)) {
       return map.normals[i].dot(map.points[j] - map.points[i]) < -step && map.points[j].z() > map.points[i].z();
+    }
   }
   return unmeasured == Unmeasured::kFar;
 }

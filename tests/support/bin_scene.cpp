@@ -30,8 +30,9 @@ Json read_json(const fs::path& path) { return Json::parse(read_bytes(path)); }
 /// 16 row-major numbers, lengths in millimetres.
 Pose read_pose(const Json& values) {
   Pose pose = Pose::Identity();
-  for (int i = 0; i < 12; ++i)
+  for (int i = 0; i < 12; ++i) {
     pose.matrix()(i / 4, i % 4) = values.at(i).get<double>() * (i % 4 == 3 ? kMillimetre : 1);
+  }
   return pose;
 }
 
