@@ -20,8 +20,9 @@ float closest_pair(std::span<const SurfacePoint> points) {
   float closest = std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = i + 1; j < points.size(); ++j) {
-      if (same_side(points[i], points[j]))
+      if (same_side(points[i], points[j])) {
         closest = std::min(closest, (points[i].position - points[j].position).norm());
+      }
     }
   }
   return closest;
