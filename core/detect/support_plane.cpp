@@ -29,6 +29,7 @@ std::vector<int> evenly_taken(const DepthMap& map, int count) {
   std::vector<int> taken;
   const int available = static_cast<int>(with_normal.size());
   const int most = std::min(count, available);
+  taken.reserve(most);
   for (int i = 0; i < most; ++i) taken.push_back(with_normal[static_cast<std::int64_t>(i) * available / most]);
   return taken;
 }
