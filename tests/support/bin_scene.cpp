@@ -65,9 +65,10 @@ PointCloud read_depth(const fs::path& folder) {
   for (std::size_t i = 0; i < count; ++i) {
     if (values[i] == 0) continue;
     const double z = values[i] * unit;
-    cloud.points[i] = Eigen::Vector3d((static_cast<double>(i % cloud.width) - k.cx) / k.fx * z,
-                                      (static_cast<double>(i / cloud.width) - k.cy) / k.fy * z, z)
-                          .cast<float>();
+    const std::size_t u = i % cloud.width, v = i / cloud.width;
+    cloud.points[i] =
+        Eigen::Vector3d((static_cast<double>(u) - k.cx) / k.fx * z, (static_cast<double>(v) - k.cy) / k.fy * z, z)
+            .cast<float>();
   }
   return cloud;
 }
