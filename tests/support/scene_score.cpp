@@ -25,7 +25,7 @@ std::vector<Eigen::Vector3d> outermost(const Mesh& mesh) {
     indices.insert(best);
   }
   std::vector<Eigen::Vector3d> points;
-  for (const std::size_t i : indices) points.push_back(mesh.vertices[i].cast<double>());
+  for (const std::size_t i : indices) points.emplace_back(mesh.vertices[i].cast<double>());
   return points;
 }
 
