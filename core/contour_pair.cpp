@@ -7,7 +7,6 @@
 namespace binpose {
 namespace {
 
-constexpr float kSameNormalCosine = 0.9659258F;  // 15 degrees
 constexpr float kTwoPi = 2 * std::numbers::pi_v<float>;
 
 }  // namespace
@@ -16,10 +15,7 @@ std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPo
                                           float flatness) {
   const Eigen::Vector3f line = b.position - a.position;
   const float distance = line.norm();
-  if (distance < shortest || distance > longest || a.normal.dot(b.normal) < kSameNormalCosine ||
-      std::abs(a.normal.dot(line)) > flatness || std::abs(b.normal.dot(line)) > flatness) {
-    return std::nullopt;
-  }
+  if (!makes_pair(a, b, shortest, longest, flatness) || !(distance > 0)) return std::nullopt;
   Eigen::Matrix3f axes;
   axes.col(0) = line / distance;
   const Eigen::Vector3f normal = a.normal + b.normal;
@@ -45,17 +41,21 @@ int ContourTable::angle_bin(float angle) {
 }
 
 ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs,
-                           std::span<const float> weights, float diameter)
+                           std::span<const float> weights, const Eigen::Vector3f& centre, float diameter)
     : diameter_(diameter), distance_tolerance_(kRelativeDistanceTolerance * diameter) {
+  std::vector<ContourFeature> features;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     for (const auto& [a, b] : {std::pair(pairs[i].a, pairs[i].b), std::pair(pairs[i].b, pairs[i].a)}) {
       const std::optional<ContourFrame> frame = contour_frame(points[a], points[b], 0, 2 * diameter, diameter);
-      if (frame) entries_.push_back({frame->feature, frame->T_outer_pair.inverse(), weights[i]});
+      if (!frame) continue;
+      const Eigen::Isometry3f T_pair_model = frame->T_outer_pair.inverse();
+      features.push_back(frame->feature);
+      votes_.push_back({T_pair_model * centre, weights[i], Eigen::Quaternionf(T_pair_model.linear())});
     }
   }
-  std::vector<std::vector<std::uint32_t>> slots(slot_of(kDistanceBins - 1, kAngleBins - 1, kAngleBins - 1) + 1);
-  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
-    const ContourFeature& f = entries_[i].feature;
+  std::vector<std::vector<Entry>> slots(slot_of(kDistanceBins - 1, kAngleBins - 1, kAngleBins - 1) + 1);
+  for (std::uint32_t i = 0; i < features.size(); ++i) {
+    const ContourFeature& f = features[i];
     const int low = distance_bin(f.distance - distance_tolerance_),
               high = distance_bin(f.distance + distance_tolerance_);
     // The angles' tolerance is a bin's width: the neighbours on either side hold all that may match.
@@ -64,15 +64,15 @@ ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const
         for (int b = -1; b <= 1; ++b) {
           slots[slot_of(d, (angle_bin(f.angle_a) + a + kAngleBins) % kAngleBins,
                         (angle_bin(f.angle_b) + b + kAngleBins) % kAngleBins)]
-              .push_back(i);
+              .push_back({f, i});
         }
       }
     }
   }
   first_.push_back(0);
-  for (const std::vector<std::uint32_t>& slot : slots) {
-    index_.insert(index_.end(), slot.begin(), slot.end());
-    first_.push_back(static_cast<std::uint32_t>(index_.size()));
+  for (const std::vector<Entry>& slot : slots) {
+    entries_.insert(entries_.end(), slot.begin(), slot.end());
+    first_.push_back(static_cast<std::uint32_t>(entries_.size()));
   }
 }
 

@@ -29,6 +29,16 @@ struct ContourFrame {
   ContourFeature feature;
 };
 
+/// Whether two contour points make a pair: coplanar and at a fitting distance; see contour_frame().
+inline bool makes_pair(const ContourPoint& a, const ContourPoint& b, float shortest, float longest, float flatness) {
+  constexpr float kSameNormalCosine = 0.9659258F;  // 15 degrees
+  const Eigen::Vector3f line = b.position - a.position;
+  const float sq_distance = line.squaredNorm();
+  return sq_distance >= shortest * shortest && sq_distance <= longest * longest &&
+         a.normal.dot(b.normal) >= kSameNormalCosine && std::abs(a.normal.dot(line)) <= flatness &&
+         std::abs(b.normal.dot(line)) <= flatness;
+}
+
 /// The frame and feature of two contour points; none when their normals differ by more than 15 degrees, when one lies
 /// more than `flatness` off the other's plane, or when their distance is outside [shortest, longest]. Metres.
 std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPoint& b, float shortest, float longest,
@@ -42,28 +52,30 @@ inline constexpr float kContourFlatness = 0.025F;
 /// Look-up from feature to the model's contour pairs. Scene pairs may come in either order of their points.
 class ContourTable {
  public:
-  struct Entry {
-    ContourFeature feature;
-    Eigen::Isometry3f T_pair_model;
+  /// What a match votes for, in the pair's frame.
+  struct Vote {
+    Eigen::Vector3f centre_in_pair;
     float weight;
+    Eigen::Quaternionf rotation_pair_model;
   };
 
   ContourTable() = default;
+  /// @param centre  of the model, the point that is voted for.
   ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs, std::span<const float> weights,
-               float diameter);
+               const Eigen::Vector3f& centre, float diameter);
 
-  /// Calls `use(entry)` for each pair whose distance and angles agree with the feature within the tolerances below.
+  /// Calls `use(vote)` for each pair whose distance and angles agree with the feature within the tolerances below.
   template <typename Use>
   void for_each_match(const ContourFeature& feature, Use&& use) const {
     if (first_.empty()) return;
     const std::size_t slot =
         slot_of(distance_bin(feature.distance), angle_bin(feature.angle_a), angle_bin(feature.angle_b));
     for (std::uint32_t i = first_[slot]; i < first_[slot + 1]; ++i) {
-      const Entry& entry = entries_[index_[i]];
+      const Entry& entry = entries_[i];
       if (std::abs(entry.feature.distance - feature.distance) <= distance_tolerance_ &&
           turn(entry.feature.angle_a, feature.angle_a) <= kAngleTolerance &&
           turn(entry.feature.angle_b, feature.angle_b) <= kAngleTolerance) {
-        use(entry);
+        use(votes_[entry.vote]);
       }
     }
   }
@@ -73,6 +85,11 @@ class ContourTable {
   static constexpr int kAngleBins = 24;
   static constexpr float kAngleTolerance = 0.2617994F;         // 15 degrees, the width of a bin
   static constexpr float kRelativeDistanceTolerance = 0.018F;  // of the diameter
+
+  struct Entry {
+    ContourFeature feature;
+    std::uint32_t vote;
+  };
 
   /// Smallest turn between two angles.
   static float turn(float a, float b) {
@@ -86,8 +103,9 @@ class ContourTable {
   }
 
   float diameter_ = 1, distance_tolerance_ = 0;
+  std::vector<Vote> votes_;
+  std::vector<std::uint32_t> first_;  // per slot: where its entries begin
   std::vector<Entry> entries_;
-  std::vector<std::uint32_t> first_, index_;  // per slot: its entries
 };
 
 }  // namespace binpose

@@ -1,5 +1,7 @@
 #include "core/model.h"
 
+#include <algorithm>
+
 namespace binpose {
 namespace {
 
@@ -19,10 +21,20 @@ void derive(Model& model) {
       }
     }
   }
+  model.view_area.assign(model.viewpoints.size(), 0);
+  float sum = 0;
+  for (std::size_t k = 0; k < model.viewpoints.size(); ++k) {
+    for (const std::uint16_t i : model.visible_from[k]) {
+      model.view_area[k] += std::max(0.0F, model.surface[i].normal.dot(model.viewpoints[k]));
+    }
+    sum += model.view_area[k];
+  }
+  const float mean = sum / static_cast<float>(model.viewpoints.size());
+  for (float& area : model.view_area) area /= std::max(mean, 1e-6F);
   model.pair_table = PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
                                static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin);
   model.contour_table = ContourTable(model.contour_points, model.contour_pairs, model.contour_weights,
-                                     static_cast<float>(model.diameter));
+                                     model.centre.cast<float>(), static_cast<float>(model.diameter));
 }
 
 }  // namespace binpose

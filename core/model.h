@@ -42,12 +42,18 @@ struct Model {
   std::vector<ContourPair> contour_pairs;    ///< the selected ones, best first; indices into `contour_points`
   std::vector<float> contour_weights;        ///< of a vote of each contour pair
   Symmetry symmetry;
-  std::vector<std::string> warnings;  ///< what is odd about the mesh, one sentence each
+  std::vector<Pose> similar_poses;           ///< T_model_model: turns by which most of the surface stays on itself
+  std::vector<SurfacePoint> telling_points;  ///< those that such a turn takes off the surface; progressive
+  double telling_spacing = 0;                ///< distance of neighbouring telling points, metres
+  std::vector<ViewMask> telling_visibility;  ///< per telling point: the viewpoints that see it
+  std::vector<std::string> warnings;         ///< what is odd about the mesh, one sentence each
 
   // Derived.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();      ///< of the bounding box: the point that is voted for
   std::vector<Eigen::Vector3f> viewpoints;               ///< unit directions from the part to the viewer
   std::vector<std::vector<std::uint16_t>> visible_from;  ///< per viewpoint: the surface points seen, in their order
+  std::vector<float>
+      view_area;  ///< per viewpoint: area of the seen surface across the view, over the mean of all views
   PairTable pair_table;
   ContourTable contour_table;
 };

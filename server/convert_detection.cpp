@@ -46,6 +46,9 @@ v1::PoseHypothesis to_proto(const PoseHypothesis& hypothesis, const std::string&
   message.set_visible_fraction(hypothesis.visible_fraction);
   message.set_explained_fraction(hypothesis.explained_fraction);
   message.set_violated_fraction(hypothesis.violated_fraction);
+  message.set_unexplained_fraction(hypothesis.unexplained_fraction);
+  message.set_confidence(hypothesis.confidence);
+  for (const Pose& variant : hypothesis.variants) *message.add_variants() = to_proto(variant, metres_per_unit);
   message.set_residual(hypothesis.residual / metres_per_unit);
   message.set_votes(hypothesis.votes);
   for (const int index : hypothesis.occluded_by) message.add_occluded_by(static_cast<std::uint32_t>(index));

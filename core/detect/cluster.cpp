@@ -177,7 +177,7 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
 
   std::vector<std::uint32_t> seeds(cells.size());
   std::iota(seeds.begin(), seeds.end(), 0);
-  const std::size_t seed_count = std::min<std::size_t>(seeds.size(), 3 * static_cast<std::size_t>(options.most));
+  const std::size_t seed_count = std::min<std::size_t>(seeds.size(), 2 * static_cast<std::size_t>(options.most));
   std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(seed_count), seeds.end(),
                     [&](std::uint32_t a, std::uint32_t b) {
                       return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;

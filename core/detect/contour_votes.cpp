@@ -7,7 +7,7 @@
 namespace binpose {
 namespace {
 
-constexpr int kBlock = 3;  // pixels: one contour point of each block takes part
+constexpr int kBlock = 4;  // pixels: one contour point of each block takes part
 constexpr int kPointsPerTask = 64;
 
 /// Contour points thinned by image block, with their outward directions turned into the tangent plane.
@@ -36,7 +36,8 @@ struct ContourGrid {
 
 void match_point(const ContourGrid& grid, int a, int reach, const Model& model, Votes& out) {
   const auto diameter = static_cast<float>(model.diameter);
-  const Eigen::Vector3f centre = model.centre.cast<float>();
+  const float shortest = kShortestContourPair * diameter, longest = kLongestContourPair * diameter,
+              flatness = kContourFlatness * diameter;
   const Eigen::Vector2i at = grid.block[a];
   for (int row = at.y(); row <= std::min(grid.rows - 1, at.y() + reach); ++row) {
     // Each pair once: the rest of this row, then the rows below.
@@ -44,14 +45,15 @@ void match_point(const ContourGrid& grid, int a, int reach, const Model& model, 
     for (int column = first; column <= std::min(grid.columns - 1, at.x() + reach); ++column) {
       const int b = grid.of_block[static_cast<std::size_t>(row) * grid.columns + column];
       if (b < 0) continue;
+      if (!makes_pair(grid.points[a], grid.points[b], shortest, longest, flatness)) continue;
       const std::optional<ContourFrame> frame =
-          contour_frame(grid.points[a], grid.points[b], kShortestContourPair * diameter, kLongestContourPair * diameter,
-                        kContourFlatness * diameter);
+          contour_frame(grid.points[a], grid.points[b], shortest, longest, flatness);
       if (!frame) continue;
       ++out.scene_pairs;
-      model.contour_table.for_each_match(frame->feature, [&](const ContourTable::Entry& entry) {
-        const Eigen::Isometry3f T_view_model = frame->T_outer_pair * entry.T_pair_model;
-        out.votes.push_back({T_view_model * centre, entry.weight, Eigen::Quaternionf(T_view_model.linear())});
+      const Eigen::Quaternionf q_view_pair(frame->T_outer_pair.linear());
+      model.contour_table.for_each_match(frame->feature, [&](const ContourTable::Vote& vote) {
+        out.votes.push_back(
+            {frame->T_outer_pair * vote.centre_in_pair, vote.weight, q_view_pair * vote.rotation_pair_model});
       });
     }
   }

@@ -18,13 +18,27 @@ constexpr double kRelativePixel = 0.014;
 constexpr double kPixelPerSpacing = 1.2;
 constexpr float kContourStep = 0.03F;
 
+/// Normals from the smallest windows that the noise allows: wide ones round off edges.
+void estimate_steady_normals(DepthMap& map, int threads) {
+  constexpr int kWidest = 3;
+  constexpr double kNormalError = 4 * kDegree;
+  estimate_normals(map, 1, threads);
+  const float noise = map.noise;
+  int radius = 1;
+  while (radius < kWidest && normal_error(noise, map.pixel_size, radius) > kNormalError) ++radius;
+  if (radius == 1) return;
+  estimate_normals(map, radius, threads);
+  map.noise = noise;
+}
+
 /// The depth map that suits a model, with all that its search reads.
 DepthMap prepare(const SensorView& view, const Model& model, const DetectParams& params, const RunControl& control,
                  DetectStats& stats) {
   const StageTimer timer(stats.preprocess_seconds);
   DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing));
-  if (view.normals.empty()) estimate_normals(map, 1, control.threads);
+  if (view.normals.empty()) estimate_steady_normals(map, control.threads);
   if (params.remove_support_plane) mark_support_plane(map, static_cast<float>(model.diameter));
+  if (control.stop.stop_requested()) return map;
   find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control.threads);
   return map;
 }
@@ -33,10 +47,18 @@ PoseHypothesis to_hypothesis(const Candidate& candidate, const DepthMap& map) {
   PoseHypothesis hypothesis;
   hypothesis.model_index = candidate.model_index;
   hypothesis.T_scene_model = map.T_scene_view * Pose(candidate.T_view_model.cast<double>());
-  hypothesis.score = candidate.evidence.score();
+  hypothesis.score = candidate.score();
   hypothesis.visible_fraction = 1 - candidate.evidence.occluded;
   hypothesis.explained_fraction = candidate.evidence.explained;
   hypothesis.violated_fraction = candidate.evidence.violated;
+  hypothesis.unexplained_fraction = candidate.evidence.unexplained;
+  hypothesis.outline_confirmed = candidate.evidence.outline_confirmed;
+  hypothesis.outline_contradicted = candidate.evidence.outline_contradicted;
+  hypothesis.explained_area = candidate.evidence.area;
+  hypothesis.confidence = candidate.confidence;
+  for (const Eigen::Isometry3f& rival : candidate.rivals) {
+    hypothesis.variants.push_back(map.T_scene_view * Pose(rival.cast<double>()));
+  }
   hypothesis.residual = candidate.evidence.residual;
   hypothesis.votes = candidate.votes;
   hypothesis.occluded_by = candidate.occluded_by;
@@ -80,7 +102,8 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
 
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    candidates = rank(finest, models, verification, std::move(candidates), params.min_score);
+    candidates = rank(finest, models, verification, std::move(candidates), params.min_score, control);
+    if (control.stop.stop_requested()) return control.status();
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   if (candidates.size() > static_cast<std::size_t>(params.max_results)) {

@@ -50,19 +50,26 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
 }  // namespace
 
 std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models,
-                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates,
-                            double min_score) {
-  const auto better = [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); };
+                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates, double min_score,
+                            const RunControl& control) {
+  const auto better = [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); };
   std::stable_sort(candidates.begin(), candidates.end(), better);
   std::vector<int> owner(map.points.size(), kNobody);
   std::vector<Candidate> accepted;
   std::size_t next = 0;
-  while (next < candidates.size() && candidates[next].evidence.score() >= min_score) {
+  while (next < candidates.size() && candidates[next].score() >= min_score && !control.stop.stop_requested()) {
     Candidate& candidate = candidates[next];
     const Model& model = *models[candidate.model_index];
-    const float before = candidate.evidence.score();
+    const float before = candidate.score();
+    if (!candidate.has_variant) {
+      VariantChoice choice = choose_variant(map, model, candidate.T_view_model, options[candidate.model_index]);
+      candidate.has_variant = true;
+      candidate.T_view_model = choice.T_view_model;
+      candidate.confidence = choice.confidence;
+      candidate.rivals = std::move(choice.rivals);
+    }
     candidate.evidence = verify(map, model, candidate.T_view_model, options[candidate.model_index], &owner);
-    if (candidate.evidence.score() < before) {
+    if (candidate.score() < before) {
       // Lost pixels to a better one: back into line.
       const Candidate moved = candidate;
       const auto place =

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/detect/variants.h"
 #include "core/detect/verify.h"
 #include "core/geometry/depth_map.h"
 #include "core/model.h"
@@ -15,7 +16,13 @@ struct Candidate {
   Eigen::Isometry3f T_view_model = Eigen::Isometry3f::Identity();
   float votes = 0;
   Evidence evidence;
-  std::vector<int> occluded_by;  ///< indices into the ranked list, ascending; set by rank()
+  bool has_variant = false;               ///< the nearly alike pose that the scene speaks for was chosen; by rank()
+  float confidence = 1;                   ///< that the choice is right
+  std::vector<Eigen::Isometry3f> rivals;  ///< T_view_model of nearly alike poses that the scene does not rule out
+  std::vector<int> occluded_by;           ///< indices into the ranked list, ascending; set by rank()
+
+  /// The evidence, times the confidence that none of the nearly alike poses is the right one.
+  float score() const { return evidence.score() * confidence; }
 };
 
 /// The best candidates, best first, without doubles.
@@ -25,9 +32,11 @@ struct Candidate {
 /// list.
 ///
 /// @param options    final verification of each model's candidates, by model index.
+/// Ends early when the caller of `control` cancels; past a deadline what was found so far is still ranked.
+///
 /// @param min_score  candidates that score less, at first or for want of free pixels, are dropped.
 std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models,
-                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates,
-                            double min_score);
+                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates, double min_score,
+                            const RunControl& control = {});
 
 }  // namespace binpose

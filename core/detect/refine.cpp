@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/detect/point_block.h"
 #include "core/detect/verify.h"
 
 namespace binpose {
@@ -38,24 +39,46 @@ struct NormalEquations {
   }
 };
 
+/// Normal equations of eight points at a time.
+struct LaneEquations {
+  Lanes A[6][6] = {}, b[6] = {}, rows = {};
+
+  [[gnu::always_inline]] void add(const PointBlock& p, const Eigen::Vector3f& pivot, float gate) {
+    const LanePoints offset = p.scene_point - p.point;
+    const LanePoints& n = p.scene_normal;
+    const Lanes distance = dot(n, offset);
+    const LaneInts matches = (p.scene_point.z > 0) & (n.z != 0) & (magnitude(distance) <= gate) &
+                             (dot(offset, offset) <= 4 * gate * gate) & (dot(n, p.normal) >= kNormalCosine);
+    const Lanes zero = {}, relative = distance * (1 / gate), pull = 1 - relative * relative;
+    const Lanes weight = matches ? pull * pull : zero;
+    const Lanes x = p.point.x - pivot.x(), y = p.point.y - pivot.y(), z = p.point.z - pivot.z();
+    const Lanes row[6] = {y * n.z - z * n.y, z * n.x - x * n.z, x * n.y - y * n.x, n.x, n.y, n.z};
+    for (int r = 0; r < 6; ++r) {
+      const Lanes weighted = weight * row[r];
+      for (int c = 0; c <= r; ++c) A[r][c] += weighted * row[c];
+      b[r] += weighted * distance;
+    }
+    rows += matches ? zero + 1 : zero;
+  }
+};
+
 /// Draws each surface point to the plane of the pixel that it falls on.
+BINPOSE_VECTORISED
 void add_surface(const DepthMap& map, const Model& model, std::span<const std::uint16_t> points,
                  const Eigen::Isometry3f& T_view_model, const Eigen::Vector3f& pivot, float gate,
                  NormalEquations& equations) {
-  for (const std::uint16_t index : points) {
-    const SurfacePoint& point = model.surface[index];
-    const Eigen::Vector3f p = T_view_model * point.position;
-    const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
-    if (pixel < 0 || !map.has_normal(pixel)) continue;
-    const Eigen::Vector3f& normal = map.normals[pixel];
-    const Eigen::Vector3f offset = map.points[pixel] - p;
-    const float distance = normal.dot(offset);
-    if (std::abs(distance) > gate || offset.squaredNorm() > 4 * gate * gate ||
-        normal.dot(T_view_model.linear() * point.normal) < kNormalCosine) {
-      continue;
-    }
-    equations.add(p - pivot, normal, distance, gate, 1);
+  LaneEquations sums;
+  PointBlock block;
+  for (std::size_t first = 0; first < points.size(); first += kLanes) {
+    block.load(model.surface, points.subspan(first), T_view_model);
+    block.look_up(map);
+    sums.add(block, pivot, gate);
   }
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c <= r; ++c) equations.A[r][c] += sum_of(sums.A[r][c]);
+    equations.b[r] += sum_of(sums.b[r]);
+  }
+  equations.rows += static_cast<int>(sum_of(sums.rows));
 }
 
 /// The scene's contour nearest to an outline point along its outward direction, or null.

@@ -25,9 +25,12 @@ constexpr float kFirstGate = 0.08F;
 constexpr float kLastGate = 0.025F;
 
 constexpr int kCoarsePoints = 80;
+constexpr int kCoarseOutlineStride = 3;
 constexpr int kClustersPerNeighbourhood = 20;
 constexpr int kRefinedPerNeighbourhood = 4;
 constexpr int kMostRefined = 200;
+constexpr int kFirstIterations = 4;
+constexpr int kFirstPoints = 100;
 constexpr int kMiddlePoints = 300;
 constexpr int kFinalistsPerNeighbourhood = 6;
 constexpr int kMostFinalists = 150;
@@ -45,8 +48,9 @@ Eigen::Isometry3f pose_of(const PoseCluster& cluster, const Model& model) {
 /// Judges every candidate, in parallel.
 void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& options, const RunControl& control,
                 std::vector<Candidate>& candidates) {
-  parallel_for(static_cast<int>(candidates.size()), control.threads,
-               [&](int i) { candidates[i].evidence = verify(map, model, candidates[i].T_view_model, options); });
+  parallel_for(static_cast<int>(candidates.size()), control.threads, [&](int i) {
+    if (!control.interrupted()) candidates[i].evidence = verify(map, model, candidates[i].T_view_model, options);
+  });
 }
 
 /// The best candidates of each neighbourhood, best first.
@@ -92,7 +96,11 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
     options.most_per_neighbourhood = kClustersPerNeighbourhood;
     options.most = params.cluster_limit;
     for (const PoseCluster& c : cluster(votes.votes, options)) {
-      candidates.push_back({model_index, pose_of(c, model), c.votes, {}, {}});
+      Candidate candidate;
+      candidate.model_index = model_index;
+      candidate.T_view_model = pose_of(c, model);
+      candidate.votes = c.votes;
+      candidates.push_back(candidate);
     }
     stats.cluster_count += candidates.size();
   }
@@ -101,6 +109,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
   coarse.tolerance = kCoarseTolerance * diameter;
   coarse.normal_cosine = 0.7F;
   coarse.most_points = kCoarsePoints;
+  coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
   return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
 }
@@ -128,6 +137,8 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   RefineOptions refinement;
   refinement.first_gate = kFirstGate * diameter;
   refinement.last_gate = kLastGate * diameter;
+  refinement.iterations = kFirstIterations;
+  refinement.most_points = kFirstPoints;
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
@@ -147,6 +158,7 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
   const float cutoff = kAlignmentCutoff * static_cast<float>(model.diameter);
   for (Candidate& candidate : candidates) {
     candidate.evidence = {};
+    candidate.evidence.area = candidate.evidence.outline_confirmed = 1;
     candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
   }
   stats.verified_count += candidates.size();

@@ -7,8 +7,8 @@
 namespace binpose {
 namespace {
 
-constexpr int kSeeds = 200;
-constexpr int kProbes = 4000;  // pixels that a candidate plane is judged on
+constexpr int kSeeds = 80;
+constexpr int kProbes = 1500;  // pixels that a candidate plane is judged on
 constexpr double kLeastShare = 0.1;
 constexpr double kMostBehind = 0.01;
 constexpr float kLeastExtent = 2;  // diameters, both ways

@@ -3,13 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/detect/point_block.h"
+
 namespace binpose {
 namespace {
 
-/// What a point in free space takes away, against what an explained one adds.
-constexpr float kViolationPenalty = 1.0F;
-/// Outline points, as a share, that are taken for granted on either side: what an outline that is hidden counts.
-constexpr float kOutlinePrior = 0.02F;
+// See Evidence::score().
+constexpr float kViolationPenalty = 2.5F;
+constexpr float kExcuse = 0.75F;
+constexpr float kMisfitPenalty = 0.75F;
+constexpr float kLargeArea = 0.8F;
+constexpr float kSizeExponent = 0.2F;
+/// What the sampling of the model leaves as residual even without noise, diameters.
+constexpr float kRelativeFloor = 0.0012F;
+/// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
+/// may all be hidden, or have nothing measured beyond it.
+constexpr float kOutlineTrust = 0.04F, kOutlineDoubt = 0.01F;
 /// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
 constexpr float kSteepest = 0.25882F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
@@ -32,7 +41,8 @@ float depth_behind(const DepthMap& map, const Eigen::Vector3f& p, const Eigen::V
 void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
                    const VerifyOptions& options, Evidence& evidence) {
   int confirmed = 0, contradicted = 0;
-  for (const ContourPoint& contour : outline) {
+  for (std::size_t i = 0; i < outline.size(); i += options.outline_stride) {
+    const ContourPoint& contour = outline[i];
     const Eigen::Vector3f p = T_view_model * contour.position;
     const Eigen::Vector3f normal = T_view_model.linear() * contour.normal;
     const Eigen::Vector3f outward = T_view_model.linear() * contour.outward;
@@ -47,9 +57,70 @@ void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline
       ++contradicted;
     }
   }
-  const float scale = 1.0F / static_cast<float>(std::max<std::size_t>(1, outline.size()));
+  const float scale =
+      static_cast<float>(options.outline_stride) / static_cast<float>(std::max<std::size_t>(1, outline.size()));
   evidence.outline_confirmed = scale * static_cast<float>(confirmed);
   evidence.outline_contradicted = scale * static_cast<float>(contradicted);
+}
+
+/// 1 for the points of a block whose pixel is still there to be explained, 0 for the others.
+[[gnu::always_inline]] inline Lanes find_free(const DepthMap& map, const std::vector<int>* owner,
+                                              const PointBlock& block) {
+  Lanes free = {};
+  for (int i = 0; i < kLanes; ++i) {
+    const int at = std::max(0, block.pixel[i]);
+    free[i] = map.background[at] != 0 || (owner != nullptr && (*owner)[at] >= 0) ? 0.0F : 1.0F;
+  }
+  return free;
+}
+
+/// Sums over points by what the sensor saw of them, each weighed by its area across the ray.
+struct SurfaceSums {
+  Lanes total = {}, explained = {}, sq_distance = {}, violated = {}, occluded = {}, unexplained = {};
+
+  [[gnu::always_inline]] void add(const PointBlock& b, const Lanes& free, float tolerance, float slack,
+                                  float normal_cosine) {
+    const Lanes zero = {};
+    const Lanes facing = -dot(b.normal, b.point) / root(dot(b.point, b.point));
+    const Lanes weight = (b.point.z > 0) & (facing >= kSteepest) ? facing : zero;
+    const Lanes judged = b.scene_point.z > 0 ? weight : zero;
+    const Lanes distance = dot(b.normal, b.scene_point - b.point);
+    const Lanes step = b.scene_point.z - b.point.z;
+    // A depth step of a slanted surface within a pixel is no contradiction.
+    const Lanes at = (magnitude(distance) <= tolerance) & (magnitude(step) < 3 * slack) ? judged : zero;
+    const Lanes same = (b.scene_normal.z != 0) & (dot(b.normal, b.scene_normal) >= normal_cosine) ? at * free : zero;
+    const Lanes off = judged - at;
+    const Lanes behind = step > slack ? off : zero, before = step < -slack ? off : zero;
+    total += weight;
+    explained += same;
+    sq_distance += same * distance * distance;
+    violated += behind;
+    occluded += before;
+    unexplained += judged - same - behind - before;
+  }
+};
+
+BINPOSE_VECTORISED
+Evidence compare_surface(const DepthMap& map, const Model& model, std::span<const std::uint16_t> points,
+                         const Eigen::Isometry3f& T_view_model, const VerifyOptions& options,
+                         const std::vector<int>* owner) {
+  SurfaceSums sums;
+  PointBlock block;
+  const float slack = options.tolerance + 1.5F * map.pixel_size;
+  for (std::size_t first = 0; first < points.size(); first += kLanes) {
+    block.load(model.surface, points.subspan(first), T_view_model);
+    block.look_up(map);
+    sums.add(block, find_free(map, owner, block), options.tolerance, slack, options.normal_cosine);
+  }
+  const float scale = 1 / std::max(sum_of(sums.total), 1e-6F);
+  Evidence evidence;
+  const float explained = sum_of(sums.explained);
+  evidence.residual = explained > 0 ? std::sqrt(sum_of(sums.sq_distance) / explained) : 0;
+  evidence.explained = scale * explained;
+  evidence.violated = scale * sum_of(sums.violated);
+  evidence.occluded = scale * sum_of(sums.occluded);
+  evidence.unexplained = scale * sum_of(sums.unexplained);
+  return evidence;
 }
 
 /// A prefix of the surface points is evenly spread; this many tell poses apart.
@@ -58,11 +129,12 @@ constexpr std::size_t kAlignedPoints = 500;
 }  // namespace
 
 float Evidence::score() const {
-  // What is hidden half excuses itself.
-  const float surface = (explained - kViolationPenalty * violated) / (1 - 0.5F * occluded);
-  const float outline =
-      (outline_confirmed + kOutlinePrior) / (outline_confirmed + outline_contradicted + 2 * kOutlinePrior);
-  return std::clamp(surface * outline, 0.0F, 1.0F);
+  const float surface = (explained - kViolationPenalty * violated) / (1 - kExcuse * occluded);
+  const float right = outline_confirmed + kOutlineTrust, wrong = outline_contradicted + kOutlineDoubt;
+  const float outline = right / (right + wrong);
+  const float fit = std::exp(-kMisfitPenalty * std::max(0.0F, relative_residual - 1));
+  const float size = std::pow(std::min(1.0F, area / kLargeArea), kSizeExponent);
+  return std::clamp(surface * outline * fit * size, 0.0F, 1.0F);
 }
 
 float alignment_score(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float cutoff) {
@@ -87,44 +159,11 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
                 const VerifyOptions& options, const std::vector<int>* owner) {
   const int viewpoint = nearest_viewpoint(model, T_view_model);
   const std::vector<std::uint16_t>& visible = model.visible_from[viewpoint];
-  const int count = std::min(options.most_points, static_cast<int>(visible.size()));
-  Evidence evidence;
-  float total = 0, sum_sq = 0;
-  for (int i = 0; i < count; ++i) {
-    const SurfacePoint& point = model.surface[visible[i]];
-    const Eigen::Vector3f p = T_view_model * point.position;
-    if (!(p.z() > 0)) continue;
-    const Eigen::Vector3f normal = T_view_model.linear() * point.normal;
-    const float weight = -normal.dot(p) / p.norm();
-    if (weight < kSteepest) continue;
-    total += weight;
-    const int pixel = map.pixel_of(p);
-    if (pixel < 0 || !map.measured(pixel)) continue;
-    const float distance = normal.dot(map.points[pixel] - p);
-    const float depth_step = map.points[pixel].z() - p.z();
-    const bool taken = map.background[pixel] != 0 || (owner != nullptr && (*owner)[pixel] >= 0);
-    // A depth step of a slanted surface within a pixel is no contradiction.
-    const float slack = options.tolerance + 1.5F * map.pixel_size;
-    if (std::abs(distance) <= options.tolerance && std::abs(depth_step) < 3 * slack) {
-      if (!taken && map.has_normal(pixel) && normal.dot(map.normals[pixel]) >= options.normal_cosine) {
-        evidence.explained += weight;
-        sum_sq += weight * distance * distance;
-      } else {
-        evidence.unexplained += weight;
-      }
-    } else if (depth_step > slack) {
-      evidence.violated += weight;
-    } else if (depth_step < -slack) {
-      evidence.occluded += weight;
-    } else {
-      evidence.unexplained += weight;
-    }
-  }
-  evidence.residual = evidence.explained > 0 ? std::sqrt(sum_sq / evidence.explained) : 0;
-  const float scale = 1 / std::max(total, 1e-6F);
-  for (float* share : {&evidence.explained, &evidence.violated, &evidence.occluded, &evidence.unexplained}) {
-    *share *= scale;
-  }
+  const std::size_t count = std::min<std::size_t>(options.most_points, visible.size());
+  Evidence evidence = compare_surface(map, model, {visible.data(), count}, T_view_model, options, owner);
+  evidence.relative_residual =
+      evidence.residual / std::max(map.noise, kRelativeFloor * static_cast<float>(model.diameter));
+  evidence.area = evidence.explained * model.view_area[viewpoint];
   check_outline(map, model.outlines[viewpoint], T_view_model, options, evidence);
   return evidence;
 }

@@ -26,6 +26,10 @@ unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9],
     }
     agree &= dot >= least;
   }
+  // Most blocks hold no match.
+  using Words = std::uint64_t __attribute__((vector_size(2 * PairTable::kBlock)));
+  const auto words = reinterpret_cast<Words>(agree);
+  if ((words[0] | words[1]) == 0) return 0;
   unsigned bits = 0;
   for (int lane = 0; lane < PairTable::kBlock; ++lane) bits |= (agree[lane] & 1U) << lane;
   return bits;

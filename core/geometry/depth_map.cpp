@@ -70,6 +70,40 @@ float point_spacing(const std::vector<Eigen::Vector3f>& points, float depth) {
   return depth * cell / std::sqrt(static_cast<float>(*middle));
 }
 
+/// The point on a pixel's ray between its neighbours, or z = 0 unless most of them were measured on one surface.
+Eigen::Vector3f between_neighbours(const DepthMap& map, int u, int v) {
+  constexpr int kFewest = 5;
+  float least = INFINITY, most = 0, sum = 0;
+  int count = 0;
+  for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
+    for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
+      const float z = map.points[static_cast<std::size_t>(row) * map.width + column].z();
+      if (!(z > 0)) continue;
+      least = std::min(least, z);
+      most = std::max(most, z);
+      sum += 1 / z;
+      ++count;
+    }
+  }
+  if (count < kFewest || most - least > 3 * map.pixel_size) return Eigen::Vector3f::Zero();
+  const float z = static_cast<float>(count) / sum;
+  return {(static_cast<float>(u) - map.cx) * z / map.focal, (static_cast<float>(v) - map.cy) * z / map.focal, z};
+}
+
+/// Scattered points leave single pixels empty that lie on a surface all the same.
+void fill_specks(DepthMap& map) {
+  std::vector<std::pair<int, Eigen::Vector3f>> filled;
+  for (int v = 0; v < map.height; ++v) {
+    for (int u = 0; u < map.width; ++u) {
+      const int i = v * map.width + u;
+      if (map.measured(i)) continue;
+      const Eigen::Vector3f point = between_neighbours(map, u, v);
+      if (point.z() > 0) filled.emplace_back(i, point);
+    }
+  }
+  for (const auto& [i, point] : filled) map.points[i] = point;
+}
+
 }  // namespace
 
 absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
@@ -139,6 +173,7 @@ DepthMap depth_map(const SensorView& view, double pixel_size) {
     map.normals[pixel] =
         n.allFinite() && n.norm() > 0.5F ? Eigen::Vector3f(sign * n.normalized()) : Eigen::Vector3f::Zero();
   }
+  if (view.normals.empty()) fill_specks(map);
   return map;
 }
 

@@ -94,6 +94,12 @@ float noise_of(std::vector<float> deviations) {
 
 }  // namespace
 
+double normal_error(double noise, double pixel_size, int radius) {
+  const double side = 2 * radius + 1;
+  const double sum_sq_offset = side * side * radius * (radius + 1) / 3;  // of a window's pixels along one axis
+  return noise / (pixel_size * std::sqrt(sum_sq_offset));
+}
+
 void estimate_normals(DepthMap& map, int radius, int threads) {
   std::vector<float> deviations(map.points.size(), -1);
   parallel_for(map.height, threads, [&](int v) {

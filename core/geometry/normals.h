@@ -12,4 +12,7 @@ namespace binpose {
 /// Deterministic on any number of threads.
 void estimate_normals(DepthMap& map, int radius, int threads);
 
+/// Standard deviation of a normal about one axis that a plane fit over a window leaves, radians; lengths in metres.
+double normal_error(double noise, double pixel_size, int radius);
+
 }  // namespace binpose

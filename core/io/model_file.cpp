@@ -17,7 +17,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "numbers are stored as they lie in memory");
 
 constexpr std::string_view kMagic = "binpose\n";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = kMagic.size() + sizeof(std::uint32_t) + sizeof(std::uint64_t);
 constexpr std::size_t kMostListed = 1U << 20;  // entries of a list; far above what training produces
 
@@ -146,18 +146,23 @@ void visit(Archive& archive, Symmetry& symmetry) {
 }
 
 template <typename Archive>
+void visit_masks(Archive& archive, std::vector<ViewMask>& masks, const TrainParams& params) {
+  archive.length(masks);
+  const int words = (std::clamp(params.viewpoint_count, 0, 4096) + 63) / 64;
+  for (ViewMask& mask : masks) {
+    mask.resize(words);
+    for (std::uint64_t& word : mask) archive.number(word);
+  }
+}
+
+template <typename Archive>
 void visit(Archive& archive, Model& model) {
   visit(archive, model.params);
   archive.number(model.diameter);
   visit(archive, model.box_min);
   visit(archive, model.box_max);
   visit(archive, model.surface);
-  archive.length(model.visibility);
-  const int words = (std::clamp(model.params.viewpoint_count, 0, 4096) + 63) / 64;
-  for (ViewMask& mask : model.visibility) {
-    mask.resize(words);
-    for (std::uint64_t& word : mask) archive.number(word);
-  }
+  visit_masks(archive, model.visibility, model.params);
   archive.length(model.outlines);
   for (std::vector<ContourPoint>& outline : model.outlines) visit(archive, outline);
   visit(archive, model.pair_points);
@@ -171,6 +176,11 @@ void visit(Archive& archive, Model& model) {
   archive.length(model.contour_weights);
   for (float& weight : model.contour_weights) archive.number(weight);
   visit(archive, model.symmetry);
+  archive.length(model.similar_poses);
+  for (Pose& pose : model.similar_poses) visit(archive, pose);
+  visit(archive, model.telling_points);
+  archive.number(model.telling_spacing);
+  visit_masks(archive, model.telling_visibility, model.params);
   archive.length(model.warnings);
   for (std::string& warning : model.warnings) visit(archive, warning);
 }
@@ -202,10 +212,13 @@ bool sound(const std::vector<float>& weights) {
   return std::all_of(weights.begin(), weights.end(), [](float weight) { return std::isfinite(weight) && weight >= 0; });
 }
 
+bool sound(const std::vector<Pose>& poses) {
+  return std::all_of(poses.begin(), poses.end(), [](const Pose& pose) { return pose.matrix().allFinite(); });
+}
+
 bool sound(const Symmetry& symmetry) {
   return !symmetry.discrete.empty() && symmetry.axis_point.allFinite() && symmetry.axis_direction.allFinite() &&
-         std::all_of(symmetry.discrete.begin(), symmetry.discrete.end(),
-                     [](const Pose& pose) { return pose.matrix().allFinite(); });
+         sound(symmetry.discrete);
 }
 
 /// What derive() and detection rely on.
@@ -224,7 +237,9 @@ bool invariants_hold(const Model& model) {
                               pair.a != pair.b;
                      }) &&
          model.pair_weights.size() == model.pairs.size() && sound(model.pair_weights) && sound(model.contour_weights) &&
-         sound(model.symmetry) && std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
+         sound(model.symmetry) && sound(model.similar_poses) && sound(model.telling_points) &&
+         std::isfinite(model.telling_spacing) && model.telling_visibility.size() == model.telling_points.size() &&
+         std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
            return pair.p < points && pair.q1 < points && pair.q2 < points && pair.p != pair.q1 && pair.p != pair.q2 &&
                   pair.q1 != pair.q2 && pair.scale < scales;
          });

@@ -4,47 +4,11 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
-#include <unordered_map>
+
+#include "core/geometry/cell_index.h"
 
 namespace binpose {
 namespace {
-
-constexpr float kSameSideCosine = 0.5F;
-
-/// Accepted points of a thinning, found by cell.
-class CellIndex {
- public:
-  CellIndex(const std::vector<SurfacePoint>& points, float cell_size) : points_(points), inverse_(1 / cell_size) {}
-
-  void insert(std::uint32_t index) { cells_[key(cell(points_[index].position))].push_back(index); }
-
-  /// Whether an accepted point on the same side lies within `distance` <= the cell size.
-  bool near(const SurfacePoint& point, float distance) const {
-    const Eigen::Array3i centre = cell(point.position);
-    for (int i = 0; i < 27; ++i) {
-      const auto found = cells_.find(key(centre + Eigen::Array3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
-      if (found == cells_.end()) continue;
-      for (const std::uint32_t other : found->second) {
-        if ((points_[other].position - point.position).squaredNorm() < distance * distance &&
-            points_[other].normal.dot(point.normal) > kSameSideCosine) {
-          return true;
-        }
-      }
-    }
-    return false;
-  }
-
- private:
-  Eigen::Array3i cell(const Eigen::Vector3f& p) const { return (p.array() * inverse_).floor().cast<int>(); }
-  static std::uint64_t key(const Eigen::Array3i& c) {
-    constexpr std::uint64_t kMask = (1U << 21) - 1;
-    return (c[0] & kMask) << 42 | (c[1] & kMask) << 21 | (c[2] & kMask);
-  }
-
-  const std::vector<SurfacePoint>& points_;
-  float inverse_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
-};
 
 /// Visits 0..count-1 once each in an order without pattern: steps of a size coprime to the count.
 std::vector<std::uint32_t> scrambled_order(std::uint32_t count) {

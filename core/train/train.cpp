@@ -7,6 +7,7 @@
 #include "core/train/outlines.h"
 #include "core/train/sample_surface.h"
 #include "core/train/select.h"
+#include "core/train/self_similarity.h"
 #include "core/train/vector_pairs.h"
 #include "core/train/visibility.h"
 
@@ -23,6 +24,9 @@ constexpr double kRelativeStep = 0.03;
 constexpr double kRelativeContourCell = 0.03;
 constexpr std::size_t kContourPairs = 3000;
 constexpr std::size_t kOutlinePoints = 48;  // per view, for verification
+/// Spacing and number of the points that tell a pose from those that look nearly alike.
+constexpr double kRelativeTellingSpacing = 0.01;
+constexpr std::size_t kMostTelling = 2000;
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
 /// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
@@ -115,6 +119,19 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   }
 
   if (absl::Status status = enter(TrainStage::kSymmetry, 0.9); !status.ok()) return status;
+  SelfSimilarity self = find_self_similarity(dense, model.surface, model.diameter, control);
+  model.symmetry = std::move(self.symmetry);
+  model.similar_poses = std::move(self.similar);
+  const std::vector<SurfacePoint> telling = telling_points(dense, model.similar_poses, model.diameter);
+  model.telling_spacing = kRelativeTellingSpacing * model.diameter;
+  do {
+    model.telling_points = thin_evenly(telling, model.telling_spacing);
+    model.telling_spacing *= 1.2;
+  } while (model.telling_points.size() > kMostTelling);
+  model.telling_spacing /= 1.2;
+  model.telling_visibility =
+      visibility(dense, model.telling_points, viewpoints, kRelativeCell * model.diameter, control);
+  if (absl::Status status = control.status(); !status.ok()) return status;
   derive(model);
   return model;
 }

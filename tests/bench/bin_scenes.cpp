@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,17 @@ double median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
   return values[values.size() / 2];
+}
+
+/// The same scan by a worse sensor: noise along the ray, and only a share of the points.
+void degrade(PointCloud& cloud, double noise, double share, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> error(0, noise);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (Eigen::Vector3f& p : cloud.points) {
+    if (noise > 0) p += p.normalized() * static_cast<float>(error(random));
+    if (share < 1 && uniform(random) >= share) p.setConstant(NAN);
+  }
 }
 
 struct Row {
@@ -57,6 +69,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", control.threads);
   app.add_option("--min-score", detect_params.min_score);
   app.add_option("--pairs", train_params.pairs_per_point);
+  app.add_option("--clusters", detect_params.cluster_limit);
   app.add_option("--share", detect_params.start_point_share);
   std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
                                                      {"observability", PairSelection::kObservability},
@@ -65,6 +78,9 @@ int main(int argc, char** argv) {
   const CLI::Option* paper =
       app.add_option("--paper", paper_selection, "the paper's preset with this selection of pairs")
           ->transform(CLI::CheckedTransformer(selections));
+  double noise_mm = 0, point_share = 1;
+  app.add_option("--noise-mm", noise_mm, "more range noise, standard deviation along the ray");
+  app.add_option("--point-share", point_share, "share of the points that is kept, at random");
   CLI11_PARSE(app, argc, argv);
   if (paper->count() > 0) {
     train_params = TrainParams::paper();
@@ -83,6 +99,9 @@ int main(int argc, char** argv) {
     std::printf("%-16s trained in %.2f s: %zu surface points, %zu pair points, %zu pairs\n", part.name.c_str(),
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->surface.size(),
                 model->pair_points.size(), model->pairs.size());
+    std::printf("%-16s symmetry: %zu turns%s; %zu similar poses, %zu telling points\n", "",
+                model->symmetry.discrete.size(), model->symmetry.has_axis ? " and an axis" : "",
+                model->similar_poses.size(), model->telling_points.size());
     trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
   }
 
@@ -98,7 +117,8 @@ int main(int argc, char** argv) {
   }
   std::sort(folders.begin(), folders.end());
   for (const auto& folder : folders) {
-    const BinScene scene = read_scene(folder, ply);
+    BinScene scene = read_scene(folder, ply);
+    degrade(scene.cloud, noise_mm / 1000, point_share, static_cast<unsigned>(&folder - folders.data()));
     if (wrong_parts) {
       for (const auto& [name, other] : trained) {
         if (name == scene.part) continue;
@@ -106,9 +126,15 @@ int main(int argc, char** argv) {
         const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
         if (!result.ok()) return 1;
         for (const PoseHypothesis& p : result->hypotheses) {
-          std::printf("%-16s taken for %-16s score %.3f vis %.3f expl %.3f viol %.3f res %.2e votes %.2f\n",
-                      scene.name.c_str(), name.c_str(), p.score, p.visible_fraction, p.explained_fraction,
-                      p.violated_fraction, p.residual, p.votes);
+          std::printf(
+              "H %s/%s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res "
+              "%.3f votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
+              scene.name.c_str(), name.c_str(), -2, p.score, p.explained_fraction, p.violated_fraction,
+              1 - p.visible_fraction, p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence,
+              p.explained_area, 1e3 * p.residual, p.votes, p.T_scene_model.translation().x(),
+              p.T_scene_model.translation().y(), p.T_scene_model.translation().z(),
+              Eigen::Quaterniond(p.T_scene_model.linear()).x(), Eigen::Quaterniond(p.T_scene_model.linear()).y(),
+              Eigen::Quaterniond(p.T_scene_model.linear()).z(), Eigen::Quaterniond(p.T_scene_model.linear()).w());
         }
       }
       continue;
@@ -129,8 +155,15 @@ int main(int argc, char** argv) {
     if (per_scene) print(scene.name, {score, {1000 * result->stats.total_seconds}});
     for (std::size_t h = 0; h < result->hypotheses.size() && dump; ++h) {
       const PoseHypothesis& p = result->hypotheses[h];
-      std::printf("H %s %d %.3f vis %.3f expl %.3f viol %.3f res %.2e votes %.2f\n", scene.part.c_str(), verdicts[h],
-                  p.score, p.visible_fraction, p.explained_fraction, p.violated_fraction, p.residual, p.votes);
+      std::printf(
+          "H %s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res %.3f "
+          "votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
+          scene.name.c_str(), verdicts[h], p.score, p.explained_fraction, p.violated_fraction, 1 - p.visible_fraction,
+          p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence, p.explained_area,
+          1e3 * p.residual, p.votes, p.T_scene_model.translation().x(), p.T_scene_model.translation().y(),
+          p.T_scene_model.translation().z(), Eigen::Quaterniond(p.T_scene_model.linear()).x(),
+          Eigen::Quaterniond(p.T_scene_model.linear()).y(), Eigen::Quaterniond(p.T_scene_model.linear()).z(),
+          Eigen::Quaterniond(p.T_scene_model.linear()).w());
     }
     const DetectStats& s = result->stats;
     sum.preprocess_seconds += s.preprocess_seconds;

@@ -95,7 +95,7 @@ TEST(ContourTable, FindsJustThePairsOfALinearScanInEitherOrder) {
   constexpr float kDiameter = 0.1F, kLengthLimit = 0.018F * kDiameter;
   const auto kAngleLimit = static_cast<float>(15 * kDegree);
   const RimPairs rim;
-  const ContourTable table(rim.points, rim.pairs, rim.weights, kDiameter);
+  const ContourTable table(rim.points, rim.pairs, rim.weights, Eigen::Vector3f::Zero(), kDiameter);
   scenes::Random random(12);
   for (int trial = 0; trial < 3000; ++trial) {
     const ContourFeature wanted = {static_cast<float>(random.uniform(0.02, 0.07)),
@@ -115,7 +115,7 @@ TEST(ContourTable, FindsJustThePairsOfALinearScanInEitherOrder) {
       }
     }
     if (at_a_limit) continue;
-    table.for_each_match(wanted, [&](const ContourTable::Entry& entry) { found.push_back(entry.weight); });
+    table.for_each_match(wanted, [&](const ContourTable::Vote& vote) { found.push_back(vote.weight); });
     std::sort(found.begin(), found.end());
     ASSERT_EQ(found, expected) << trial;
   }
@@ -123,18 +123,20 @@ TEST(ContourTable, FindsJustThePairsOfALinearScanInEitherOrder) {
 
 TEST(ContourTable, LeadsFromAMatchToThePose) {
   const RimPairs rim;
-  const ContourTable table(rim.points, rim.pairs, rim.weights, 0.1F);
+  const ContourTable table(rim.points, rim.pairs, rim.weights, {0.01F, 0.02F, 0.03F}, 0.1F);
   const ContourFrame frame = *contour_frame(rim.points[rim.pairs[0].a], rim.points[rim.pairs[0].b], 0, 1, 1);
   bool unmoved = false;
-  table.for_each_match(frame.feature, [&](const ContourTable::Entry& entry) {
-    unmoved = unmoved || (frame.T_outer_pair * entry.T_pair_model).isApprox(Eigen::Isometry3f::Identity(), 1e-4F);
+  table.for_each_match(frame.feature, [&](const ContourTable::Vote& vote) {
+    const Eigen::Vector3f centre = frame.T_outer_pair * vote.centre_in_pair;
+    const Eigen::Quaternionf turn = Eigen::Quaternionf(frame.T_outer_pair.linear()) * vote.rotation_pair_model;
+    unmoved = unmoved || (centre.isApprox(Eigen::Vector3f(0.01F, 0.02F, 0.03F), 1e-3F) && std::abs(turn.w()) > 0.9999F);
   });
   EXPECT_TRUE(unmoved);
 }
 
 TEST(ContourTable, OfNoPairsFindsNone) {
-  ContourTable().for_each_match({0.05F, 0, 0}, [](const ContourTable::Entry&) { FAIL(); });
-  ContourTable({}, {}, {}, 0.1F).for_each_match({0.05F, 0, 0}, [](const ContourTable::Entry&) { FAIL(); });
+  ContourTable().for_each_match({0.05F, 0, 0}, [](const ContourTable::Vote&) { FAIL(); });
+  ContourTable({}, {}, {}, {0, 0, 0}, 0.1F).for_each_match({0.05F, 0, 0}, [](const ContourTable::Vote&) { FAIL(); });
 }
 
 }  // namespace

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "core/geometry/depth_map.h"
+#include "core/geometry/lanes.h"
+#include "core/vector_pair.h"
+
+namespace binpose {
+
+/// Points in the lanes of vectors, one coordinate each.
+struct LanePoints {
+  Lanes x, y, z;
+};
+
+inline Lanes dot(const LanePoints& a, const LanePoints& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline LanePoints operator-(const LanePoints& a, const LanePoints& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline LanePoints rotate(const Eigen::Isometry3f& T, const LanePoints& p) {
+  const Eigen::Matrix4f& m = T.matrix();
+  return {m(0, 0) * p.x + m(0, 1) * p.y + m(0, 2) * p.z, m(1, 0) * p.x + m(1, 1) * p.y + m(1, 2) * p.z,
+          m(2, 0) * p.x + m(2, 1) * p.y + m(2, 2) * p.z};
+}
+
+/// Three coordinates of points that come one by one, until they are loaded into lanes.
+struct LaneBuffer {
+  alignas(sizeof(Lanes)) float x[kLanes], y[kLanes], z[kLanes];
+
+  [[gnu::always_inline]] void set(int lane, const Eigen::Vector3f& p) {
+    x[lane] = p.x();
+    y[lane] = p.y();
+    z[lane] = p.z();
+  }
+  [[gnu::always_inline]] LanePoints load() const {
+    LanePoints p;
+    __builtin_memcpy(&p.x, x, sizeof(x));
+    __builtin_memcpy(&p.y, y, sizeof(y));
+    __builtin_memcpy(&p.z, z, sizeof(z));
+    return p;
+  }
+};
+
+/// Surface points under a pose, and what the sensor measured where they fall; eight at a time.
+struct PointBlock {
+  LanePoints point, normal;              ///< of the model, view frame; lanes without a point have z = -1
+  LanePoints scene_point, scene_normal;  ///< measured there; z = 0: nothing measured, no normal
+  LaneInts pixel;                        ///< where, or -1
+
+  /// Takes up to eight points of a list of indices.
+  [[gnu::always_inline]] void load(const std::vector<SurfacePoint>& surface, std::span<const std::uint16_t> indices,
+                                   const Eigen::Isometry3f& T_view_model) {
+    const int count = static_cast<int>(std::min<std::size_t>(kLanes, indices.size()));
+    LaneBuffer positions, normals;
+    for (int i = 0; i < kLanes; ++i) {
+      const SurfacePoint& source = surface[indices[i < count ? i : 0]];
+      positions.set(i, source.position);
+      normals.set(i, source.normal);
+    }
+    const Eigen::Vector3f t = T_view_model.translation();
+    point = rotate(T_view_model, positions.load());
+    point = {point.x + t.x(), point.y + t.y(), point.z + t.z()};
+    normal = rotate(T_view_model, normals.load());
+    for (int i = count; i < kLanes; ++i) point.z[i] = -1;
+  }
+
+  /// Finds the pixel of each point and takes what was measured there.
+  [[gnu::always_inline]] void look_up(const DepthMap& map) {
+    const Lanes scale = map.focal / point.z;
+    const Lanes u = point.x * scale + (map.cx + 0.5F), v = point.y * scale + (map.cy + 0.5F);
+    const LaneInts inside = (point.z > 0) & (u >= 0) & (v >= 0) & (u < static_cast<float>(map.width)) &
+                            (v < static_cast<float>(map.height));
+    const Lanes zero = {};
+    pixel = __builtin_convertvector(inside ? v : zero, LaneInts) * map.width +
+            __builtin_convertvector(inside ? u : zero, LaneInts);
+    LaneBuffer positions, normals;
+    for (int i = 0; i < kLanes; ++i) {
+      positions.set(i, map.points[pixel[i]]);
+      normals.set(i, map.normals[pixel[i]]);
+    }
+    scene_point = positions.load();
+    scene_normal = normals.load();
+    scene_point.z = inside ? scene_point.z : zero;
+    scene_normal.z = inside ? scene_normal.z : zero;
+    pixel = inside ? pixel : LaneInts{} - 1;
+  }
+};
+
+}  // namespace binpose

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+/// Compiles a function for today's processors as well as for the baseline; the program picks one when it starts.
+/// Neither fuses multiplication with addition, so that both give the same bits. (Sanitizers can't start with such
+/// functions.)
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define BINPOSE_VECTORISED __attribute__((target_clones("avx2", "default")))
+#else
+#define BINPOSE_VECTORISED
+#endif
+
+namespace binpose {
+
+/// Eight numbers that are computed with at once.
+constexpr int kLanes = 8;
+using Lanes = float __attribute__((vector_size(4 * kLanes)));
+using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< masks as well: -1 = true
+
+[[gnu::always_inline]] inline Lanes magnitude(const Lanes& a) { return a < 0 ? -a : a; }
+
+[[gnu::always_inline]] inline Lanes root(const Lanes& a) {
+  Lanes result = {};
+  for (int i = 0; i < kLanes; ++i) result[i] = std::sqrt(a[i]);
+  return result;
+}
+
+/// In a fixed order, whatever the processor.
+[[gnu::always_inline]] inline float sum_of(const Lanes& a) {
+  return ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]));
+}
+
+}  // namespace binpose

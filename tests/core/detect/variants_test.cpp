@@ -1,0 +1,72 @@
+#include "core/detect/variants.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/scan_map.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A hexagon that a small block on one face makes unequal to its turns.
+Mesh marked_hexagon() {
+  return testing::joined(testing::hexagon(),
+                         testing::shifted(testing::box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F}));
+}
+
+struct Scan {
+  Model model = testing::quick_model(marked_hexagon());
+  Pose T_scene_model;
+  DepthMap map;
+
+  explicit Scan(const Pose& pose) : T_scene_model(pose) {
+    map = testing::scan_map({{{marked_hexagon(), pose}}}, {}, model.diameter);
+  }
+  VariantChoice choose(const Pose& T) const {
+    VerifyOptions options;
+    options.tolerance = static_cast<float>(0.012 * model.diameter);
+    return choose_variant(map, model, testing::in_view(map, T), options);
+  }
+};
+
+Pose turned(const Pose& T, double degrees) { return T * testing::pose(degrees, Vector3d::UnitZ(), Vector3d::Zero()); }
+
+// The marked face towards the sensor, which looks along z; then away from it.
+const Pose kMarkSeen = testing::pose(175, Vector3d::UnitX(), {0, 0, 0.35});
+const Pose kMarkHidden = testing::pose(5, Vector3d::UnitX(), {0, 0, 0.35});
+
+TEST(Variants, TellATurnFromTheTruthByTheMark) {
+  const Scan scan(kMarkSeen);
+  ASSERT_FALSE(scan.model.similar_poses.empty());
+  for (int sixth = 0; sixth < 6; ++sixth) {
+    const VariantChoice choice = scan.choose(turned(kMarkSeen, 60 * sixth));
+    const Pose chosen(choice.T_view_model.cast<double>());
+    const Pose truth(testing::in_view(scan.map, kMarkSeen).cast<double>());
+    EXPECT_LT(rotation_distance(chosen, truth), 4 * kDegree) << sixth;
+    EXPECT_GT(choice.confidence, 0.95F) << sixth;
+    EXPECT_TRUE(choice.rivals.empty()) << sixth;
+  }
+}
+
+TEST(Variants, AreRivalsWhenTheMarkIsHidden) {
+  const Scan scan(kMarkHidden);
+  const VariantChoice choice = scan.choose(kMarkHidden);
+  EXPECT_GE(choice.rivals.size(), 5u);
+  EXPECT_LT(choice.confidence, 0.5F);
+}
+
+TEST(Variants, OfAPartWithoutLikesIsThePoseItself) {
+  const Pose pose = testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43});
+  const Model model = testing::quick_model(testing::l_block());
+  const DepthMap map = testing::scan_map({{{testing::l_block(), pose}}}, {}, model.diameter);
+  const Eigen::Isometry3f T = testing::in_view(map, pose);
+  const VariantChoice choice = choose_variant(map, model, T, {});
+  EXPECT_EQ(choice.T_view_model.matrix(), T.matrix());
+  EXPECT_EQ(choice.confidence, 1.0F);
+  EXPECT_TRUE(choice.rivals.empty());
+}
+
+}  // namespace
+}  // namespace binpose

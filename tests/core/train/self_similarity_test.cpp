@@ -1,0 +1,96 @@
+#include "core/train/self_similarity.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/train/mesh_extent.h"
+#include "core/train/sample_surface.h"
+#include "tests/support/shapes.h"
+
+namespace binpose {
+namespace {
+
+/// A part as training sees it.
+struct Part {
+  double diameter;
+  std::vector<SurfacePoint> dense, surface;
+
+  explicit Part(const Mesh& mesh)
+      : diameter(mesh_extent(mesh).diameter),
+        dense(scatter(mesh, 0.007 * diameter)),
+        surface(thin_evenly(dense, 0.015 * diameter)) {}
+  SelfSimilarity search() const { return find_self_similarity(dense, surface, diameter, {}); }
+};
+
+Mesh marked_hexagon() {
+  return testing::joined(testing::hexagon(),
+                         testing::shifted(testing::box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F}));
+}
+
+TEST(SelfSimilarity, OfAnLIsTheIdentityAlone) {
+  const SelfSimilarity found = Part(testing::l_block()).search();
+  EXPECT_EQ(found.symmetry.discrete.size(), 1u);
+  EXPECT_FALSE(found.symmetry.has_axis);
+}
+
+TEST(SelfSimilarity, OfABoxOfThreeLengthsIsItsFourTurns) {
+  const Part part(testing::box({0.08F, 0.05F, 0.03F}));
+  const SelfSimilarity found = part.search();
+  EXPECT_EQ(found.symmetry.discrete.size(), 4u);
+  for (const Pose& T : found.symmetry.discrete) {
+    const double angle = Eigen::AngleAxisd(T.linear()).angle();
+    EXPECT_TRUE(angle < kDegree || std::abs(angle - 180 * kDegree) < kDegree) << angle;
+    EXPECT_LT(T.translation().norm(), 0.01 * part.diameter);
+  }
+}
+
+TEST(SelfSimilarity, OfAHexagonIsItsTwelveTurns) {
+  const SelfSimilarity found = Part(testing::hexagon()).search();
+  EXPECT_EQ(found.symmetry.discrete.size(), 12u);
+  EXPECT_FALSE(found.symmetry.has_axis);
+}
+
+TEST(SelfSimilarity, OfAShaftIsItsAxis) {
+  const SelfSimilarity found = Part(testing::stepped_shaft()).search();
+  ASSERT_TRUE(found.symmetry.has_axis);
+  EXPECT_GT(std::abs(found.symmetry.axis_direction.z()), 0.9995);
+  EXPECT_LT(found.symmetry.axis_point.head<2>().norm(), 0.001);
+  EXPECT_EQ(found.symmetry.discrete.size(), 1u);
+}
+
+TEST(SelfSimilarity, CallsAMarkedHexagonSimilarNotSymmetric) {
+  const Part part(marked_hexagon());
+  const SelfSimilarity found = part.search();
+  EXPECT_EQ(found.symmetry.discrete.size(), 1u);
+  int sixths = 0;
+  for (const Pose& T : found.similar) {
+    const double angle = Eigen::AngleAxisd(T.linear()).angle();
+    sixths += std::abs(std::remainder(angle, 60 * kDegree)) < 2 * kDegree;
+  }
+  EXPECT_GE(sixths, 5);
+  const std::vector<SurfacePoint> telling = telling_points(part.dense, found.similar, part.diameter);
+  EXPECT_FALSE(telling.empty());
+  EXPECT_LT(telling.size(), part.dense.size());
+}
+
+TEST(SelfSimilarity, IsTheSameEveryTime) {
+  const Part part(testing::hexagon());
+  const SelfSimilarity once = part.search(), again = part.search();
+  ASSERT_EQ(once.symmetry.discrete.size(), again.symmetry.discrete.size());
+  for (std::size_t i = 0; i < once.symmetry.discrete.size(); ++i) {
+    EXPECT_EQ(once.symmetry.discrete[i].matrix(), again.symmetry.discrete[i].matrix());
+  }
+}
+
+TEST(SelfSimilarity, OfAStoppedSearchIsTheIdentity) {
+  std::stop_source stop;
+  stop.request_stop();
+  const Part part(testing::hexagon());
+  RunControl control;
+  control.stop = stop.get_token();
+  EXPECT_EQ(find_self_similarity(part.dense, part.surface, part.diameter, control).symmetry.discrete.size(), 1u);
+}
+
+}  // namespace
+}  // namespace binpose
