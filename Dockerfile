@@ -15,4 +15,5 @@ USER binpose
 VOLUME /models
 EXPOSE 50051 9464
 STOPSIGNAL SIGTERM
-ENTRYPOINT ["binpose-server", "--listen", "0.0.0.0:50051", "--metrics", "0.0.0.0:9464", "--model-dir", "/models"]
+# A container's network is closed unless its ports are published: publish to loopback, or mount --tls-cert and --tls-key.
+ENTRYPOINT ["binpose-server", "--listen", "0.0.0.0:50051", "--insecure", "--metrics", "0.0.0.0:9464", "--model-dir", "/models"]

@@ -13,6 +13,12 @@ std::string explain(const grpc::Status& status, const std::string& server) {
       return "the server at " + server + " took too long. Try again, or allow more time.";
     case grpc::StatusCode::UNIMPLEMENTED:
       return "what answers at " + server + " does not offer this call: it is another service, or another version.";
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      // gRPC's own words: "Received message larger than max (SIZE vs. LIMIT)", in bytes.
+      if (status.error_message().find("larger than max") != std::string::npos) {
+        return status.error_message() + ". Send less, or raise the server's --max-message-mib.";
+      }
+      return status.error_message();
     default:
       return status.error_message();
   }

@@ -1,5 +1,7 @@
 #include "client/client.h"
 
+#include <grpcpp/support/client_interceptor.h>
+
 #include <utility>
 
 #include "client/call_error.h"
@@ -7,14 +9,53 @@
 namespace binpose::client {
 namespace {
 
-std::shared_ptr<grpc::Channel> open_channel(const std::string& server) {
+/// Puts a bearer token on every call. An interceptor, because gRPC's call credentials refuse plaintext.
+class TokenInterceptor final : public grpc::experimental::Interceptor {
+ public:
+  explicit TokenInterceptor(const std::string& token) : header_("Bearer " + token) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    using grpc::experimental::InterceptionHookPoints;
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace("authorization", header_);
+    }
+    methods->Proceed();
+  }
+
+ private:
+  const std::string header_;
+};
+
+class TokenInterceptorFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenInterceptorFactory(std::string token) : token_(std::move(token)) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo* /*info*/) override {
+    return new TokenInterceptor(token_);
+  }
+
+ private:
+  const std::string token_;
+};
+
+std::shared_ptr<grpc::ChannelCredentials> credentials(const Connection& connection) {
+  if (connection.tls_ca.empty()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = connection.tls_ca;
+  options.pem_cert_chain = connection.tls_cert;
+  options.pem_private_key = connection.tls_key;
+  return grpc::SslCredentials(options);
+}
+
+std::shared_ptr<grpc::Channel> open_channel(const Connection& connection) {
   grpc::ChannelArguments arguments;
   // The server states its own limits in its errors; gRPC's 4 MB would refuse answers here before anyone reads them.
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
   // Notices a peer that vanished without a word. Servers take more than one ping in five minutes for abuse.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 310'000);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!connection.token.empty()) interceptors.push_back(std::make_unique<TokenInterceptorFactory>(connection.token));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(connection.server, credentials(connection), arguments,
+                                                                 std::move(interceptors));
 }
 
 void set_timeout(std::chrono::milliseconds timeout, grpc::ClientContext& context) {
@@ -23,10 +64,10 @@ void set_timeout(std::chrono::milliseconds timeout, grpc::ClientContext& context
 
 }  // namespace
 
-Client::Client(std::string server, Timeouts timeouts)
-    : server_(std::move(server)),
+Client::Client(const Connection& connection, Timeouts timeouts)
+    : server_(connection.server),
       timeouts_(timeouts),
-      channel_(open_channel(server_)),
+      channel_(open_channel(connection)),
       models_(v1::ModelService::NewStub(channel_)),
       detection_(v1::DetectionService::NewStub(channel_)) {}
 
@@ -76,6 +117,39 @@ absl::Status Client::delete_model(const std::string& id) {
   request.set_id(id);
   v1::DeleteModelResponse response;
   return call_error(models_->DeleteModel(&context, request, &response), {"Deleting model \"" + id + "\"", server_});
+}
+
+absl::StatusOr<std::string> Client::export_model(const std::string& id) {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::ExportModelRequest request;
+  request.set_id(id);
+  const auto stream = models_->ExportModel(&context, request);
+  std::string bytes;
+  v1::ExportModelResponse part;
+  while (stream->Read(&part)) bytes += part.data();
+  const grpc::Status status = stream->Finish();
+  if (!status.ok()) return call_error(status, {"Exporting model \"" + id + "\"", server_});
+  return bytes;
+}
+
+absl::StatusOr<v1::Model> Client::import_model(const std::string& id, const std::string& bytes) {
+  constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::ImportModelResponse response;
+  const auto stream = models_->ImportModel(&context, &response);
+  v1::ImportModelRequest part;
+  part.set_id(id);
+  std::size_t sent = 0;
+  do {
+    part.set_data(bytes.substr(sent, kPieceBytes));
+    sent += part.data().size();
+  } while (stream->Write(part) && sent < bytes.size());
+  stream->WritesDone();
+  const grpc::Status status = stream->Finish();
+  if (!status.ok()) return call_error(status, {"Importing model \"" + id + "\"", server_});
+  return response.model();
 }
 
 absl::StatusOr<v1::DetectResponse> Client::detect(const v1::DetectRequest& request) {

@@ -23,6 +23,15 @@ struct Timeouts {
   std::chrono::milliseconds answer = std::chrono::minutes(1);     ///< the next answer on a stream of frames
 };
 
+/// How to reach a server.
+struct Connection {
+  std::string server;         ///< HOST:PORT
+  std::string tls_ca = {};    ///< PEM text of the authorities that vouch for the server; empty = plaintext
+  std::string tls_cert = {};  ///< PEM text of the certificate that the server asks for; empty = none
+  std::string tls_key = {};   ///< PEM text of its key
+  std::string token = {};     ///< bearer token; empty = none. In plaintext everybody on the way can read it.
+};
+
 /// Told what a training does; see TrainResponse.
 using TrainObserver = std::function<void(const v1::TrainResponse& progress)>;
 
@@ -31,8 +40,10 @@ using TrainObserver = std::function<void(const v1::TrainResponse& progress)>;
 /// Every error is a sentence that says what failed, where, and what to do next; its code is that of the gRPC call.
 class Client {
  public:
-  /// `server`: HOST:PORT, plaintext. Connects with the first call, and again when the connection is lost.
-  explicit Client(std::string server, Timeouts timeouts = {});
+  /// Connects with the first call, and again when the connection is lost.
+  explicit Client(const Connection& connection, Timeouts timeouts = {});
+  /// `server`: HOST:PORT, plaintext.
+  explicit Client(const std::string& server, Timeouts timeouts = {}) : Client(Connection{.server = server}, timeouts) {}
 
   /// Trains a model and waits until it is served. `observer` is called on this thread, for every message of progress.
   absl::StatusOr<v1::Model> train(const v1::TrainRequest& request, const TrainObserver& observer = {});
@@ -40,6 +51,9 @@ class Client {
   absl::StatusOr<v1::Model> get_model(const std::string& id);
   absl::StatusOr<v1::ListModelsResponse> list_models();
   absl::Status delete_model(const std::string& id);
+  /// The bytes of a model, for import_model() of another server.
+  absl::StatusOr<std::string> export_model(const std::string& id);
+  absl::StatusOr<v1::Model> import_model(const std::string& id, const std::string& bytes);
 
   /// Searches one scan. An answer that carries an `error` becomes that error.
   absl::StatusOr<v1::DetectResponse> detect(const v1::DetectRequest& request);

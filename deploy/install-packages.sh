@@ -3,10 +3,10 @@
 # Usage: install-packages.sh run|build|test
 set -eu
 
-run="libabsl20220623 libgrpc++1.51 liblzf1 libpng16-16 libprometheus-cpp-core1.0 libprometheus-cpp-pull1.0
+run="libabsl20220623 libcivetweb1 libgrpc++1.51 liblzf1 libpng16-16 libprometheus-cpp-core1.0
   libprotobuf32 libspdlog1.10 libssl3 libtbb12"
 build="cmake g++ ninja-build
-  libabsl-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
+  libabsl-dev libcivetweb-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
 test="clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev
   pkgconf python3 shellcheck"

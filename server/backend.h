@@ -2,8 +2,10 @@
 
 #include "server/compute_pool.h"
 #include "server/drain.h"
+#include "server/memory_budget.h"
 #include "server/metrics.h"
 #include "server/model_store.h"
+#include "server/tokens.h"
 
 namespace binpose::server {
 
@@ -12,6 +14,8 @@ struct Backend {
   ModelStore& models;
   ComputePool& detections;
   ComputePool& trainings;  ///< its own threads, so that trainings never fill those of detections
+  MemoryBudget& requests;  ///< the bytes of all requests that wait or are computed
+  const Tokens& tokens;
   Metrics& metrics;
   Drain& drain;
 };

@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): named by the library
 class App;
@@ -13,10 +16,10 @@ namespace binpose::server {
 
 /// How the server runs. A default is written here only.
 struct Config {
-  /// HOST:PORT of the gRPC services, plaintext; port 0 = a free one. Loopback unless told otherwise, because whoever
-  /// reaches it may train and delete. 0.0.0.0 is allowed, for containers whose network is closed.
+  /// HOST:PORT of the gRPC services; port 0 = a free one. In plaintext it must be loopback, because whoever reaches it
+  /// may train and delete, unless `insecure` is said.
   std::string listen = "127.0.0.1:50051";
-  /// HOST:PORT of GET /metrics; port 0 = a free one; empty = not served.
+  /// HOST:PORT of GET /metrics, /healthz and /readyz; port 0 = a free one; empty = not served.
   std::string metrics = "127.0.0.1:9464";
   /// Where models are kept; made if it is missing.
   std::filesystem::path model_dir = "models";
@@ -26,13 +29,35 @@ struct Config {
   int queue = 64;
   /// Largest message that is taken.
   int max_message_mib = 64;
+  /// Bytes of requests that may wait or be computed at a time. gRPC's buffers may take as much again.
+  int request_memory_mib = 512;
+  /// Sum of the sizes of the model files that are served.
+  int models_memory_mib = 1024;
   /// How long calls may go on after SIGTERM.
   int drain_timeout_seconds = 30;
+  /// PEM files of the certificate chain and its key; empty = plaintext. Read again when they change.
+  std::filesystem::path tls_cert;
+  std::filesystem::path tls_key;
+  /// PEM file of the authorities whose certificates callers must show; empty = callers need none.
+  std::filesystem::path tls_client_ca;
+  /// See Tokens; empty = whoever reaches the server may do all.
+  std::filesystem::path token_file;
+  /// Plaintext for other machines is meant.
+  bool insecure = false;
   /// One of spdlog's levels.
   std::string log_level = "info";
+  /// "text" or "json".
+  std::string log_format = "text";
 };
 
-/// Makes the command line of `app` fill `config`.
+/// Makes the command line and configuration file of `app` fill `config`.
 void add_options(CLI::App& app, Config& config);
+
+/// What `app` is to parse, in the order that CLI11 wants: what the variables BINPOSE_<OPTION> say, then the command
+/// line, which wins; both win over the configuration file.
+std::vector<std::string> all_arguments(const CLI::App& app, std::vector<std::string> command_line);
+
+/// OK, or INVALID_ARGUMENT naming the options that do not go together or the file that cannot be used.
+absl::Status check(const Config& config);
 
 }  // namespace binpose::server

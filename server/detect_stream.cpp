@@ -1,11 +1,15 @@
 #include "server/detect_stream.h"
 
+#include <utility>
+
+#include "server/log.h"
+
 namespace binpose::server {
 
-DetectStream::DetectStream(FrameHandler& handler, ComputePool& pool, Drain& drain, prometheus::Gauge& open_streams,
-                           std::optional<Clock::time_point> deadline)
-    : handler_(handler), pool_(pool), open_streams_(open_streams), deadline_(deadline), call_(drain) {
-  open_streams_.Increment();
+DetectStream::DetectStream(const Surroundings& surroundings, std::optional<Clock::time_point> deadline,
+                           std::string trace_id)
+    : around_(surroundings), deadline_(deadline), trace_id_(std::move(trace_id)), call_(surroundings.drain) {
+  around_.open_streams.Increment();
   advance([] {});
   call_.when_draining([this] { advance([this] { draining_ = true; }); });
 }
@@ -32,17 +36,36 @@ void DetectStream::OnWriteDone(bool /*ok*/) {
   });
 }
 
+void DetectStream::OnCancel() {
+  cancel_time_ = Clock::now();
+  stop_.request_stop();
+  around_.pool.run_stopped();
+}
+
 void DetectStream::submit(Frame& frame) {
-  const absl::Status admitted = pool_.submit([this, &frame] {
-    const RunControl control = {.stop = stop_.get_token(), .deadline = deadline_, .threads = pool_.fair_share()};
-    set_answer(frame, handler_.answer(frame.bytes, frame.arrival, control));
-  });
-  if (!admitted.ok()) set_answer(frame, handler_.refuse(frame.bytes, admitted));
+  absl::StatusOr<MemoryBudget::Share> memory = around_.memory.take(frame.bytes.Length());
+  absl::Status admitted = memory.status();
+  if (admitted.ok()) {
+    frame.memory = *std::move(memory);
+    admitted =
+        around_.pool.submit([this, &frame] { compute(frame); }, {.stop = stop_.get_token(), .deadline = deadline_});
+  }
+  if (!admitted.ok()) set_answer(frame, around_.handler.refuse(frame.bytes, admitted));
+}
+
+void DetectStream::compute(Frame& frame) {
+  const LogTrace log_trace(trace_id_);
+  const RunControl control = {.stop = stop_.get_token(), .deadline = deadline_, .threads = around_.pool.fair_share()};
+  const CancelPlace place = control.stop.stop_requested() ? CancelPlace::kQueue : CancelPlace::kCompute;
+  grpc::ByteBuffer answer = around_.handler.answer(frame.bytes, frame.arrival, control);
+  if (control.stop.stop_requested()) around_.handler.note_cancel(place, seconds_since(cancel_time_));
+  set_answer(frame, std::move(answer));
 }
 
 void DetectStream::set_answer(Frame& frame, grpc::ByteBuffer answer) {
   advance([&] {
     frame.bytes.Swap(&answer);
+    frame.memory = {};
     frame.answered = true;
   });
 }

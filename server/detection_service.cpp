@@ -14,6 +14,8 @@
 #include "server/convert_geometry.h"
 #include "server/detection_limits.h"
 #include "server/frame_bytes.h"
+#include "server/log.h"
+#include "server/refused_stream.h"
 #include "server/status.h"
 
 namespace binpose::server {
@@ -70,8 +72,12 @@ absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, 
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* DetectionService::Detect(
     grpc::CallbackServerContext* context) {
-  return new DetectStream(*this, backend_.detections, backend_.drain, backend_.metrics.streams(),
-                          compute_deadline(context->deadline()));
+  if (absl::Status allowed = backend_.tokens.check(*context, Role::kDetect); !allowed.ok()) {
+    backend_.metrics.count_request(Method::kDetect, allowed.code(), 0);
+    return new RefusedStream(to_grpc(allowed));
+  }
+  return new DetectStream({*this, backend_.detections, backend_.requests, backend_.drain, backend_.metrics.streams()},
+                          compute_deadline(context->deadline()), trace_id_of(*context));
 }
 
 grpc::ByteBuffer DetectionService::answer(grpc::ByteBuffer& frame, Clock::time_point arrival,
@@ -88,13 +94,15 @@ grpc::ByteBuffer DetectionService::answer(grpc::ByteBuffer& frame, Clock::time_p
     request_id = request.request_id();
     return find_parts(request, backend_.models, control);
   });
+  const LogRequest log_request(request_id);
   v1::DetectResponse response;
   if (found.ok()) {
     response = *found;
     response.mutable_stats()->set_queue_seconds(queue_seconds);
-    backend_.metrics.observe_detection(response.stats());
+    backend_.metrics.observe_detection(response.stats(), static_cast<std::size_t>(response.hypotheses_size()));
   } else {
     *response.mutable_error() = to_error(found.status());
+    log_failure("a detection", found.status());
   }
   response.set_request_id(request_id);
   backend_.metrics.count_request(Method::kDetect, found.status().code(), seconds_since(arrival));
@@ -106,7 +114,12 @@ grpc::ByteBuffer DetectionService::refuse(grpc::ByteBuffer& frame, const absl::S
   response.set_request_id(request_id_of(frame));
   *response.mutable_error() = to_error(reason);
   backend_.metrics.count_request(Method::kDetect, reason.code(), 0);
+  backend_.metrics.count_refusal(reason);
   return encode(response);
+}
+
+void DetectionService::note_cancel(CancelPlace place, double seconds) {
+  backend_.metrics.observe_cancel(place == CancelPlace::kQueue ? "queue" : "compute", seconds);
 }
 
 }  // namespace binpose::server

@@ -24,6 +24,7 @@ class DetectionService final : public v1::DetectionService::WithRawCallbackMetho
  private:
   grpc::ByteBuffer answer(grpc::ByteBuffer& frame, Clock::time_point arrival, const RunControl& control) override;
   grpc::ByteBuffer refuse(grpc::ByteBuffer& frame, const absl::Status& reason) override;
+  void note_cancel(CancelPlace place, double seconds) override;
 
   Backend backend_;
 };

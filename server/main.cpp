@@ -21,14 +21,52 @@ sigset_t end_signals() {
   return signals;
 }
 
+enum class Action { kServe, kPrintConfig, kCheckConfig, kHealthcheck };
+
+void add_actions(CLI::App& app, Action& action) {
+  const auto add = [&](const char* name, Action chosen, const char* help) {
+    app.add_flag_callback(
+           name, [&action, chosen] { action = chosen; }, help)
+        ->configurable(false);
+  };
+  add("--print-config", Action::kPrintConfig, "Print the settings as a configuration file, and end");
+  add("--check-config", Action::kCheckConfig, "Say whether the settings can be used, and end");
+  add("--healthcheck", Action::kHealthcheck, "Say whether the server at --metrics is ready, and end");
+}
+
+absl::Status healthcheck(const binpose::server::Config& config) {
+  if (config.metrics.empty()) return absl::InvalidArgumentError("--healthcheck asks --metrics, which is empty.");
+  return binpose::server::probe(config.metrics, "/readyz");
+}
+
+int report(const absl::Status& status) {
+  if (status.ok()) return EXIT_SUCCESS;
+  std::cerr << status.message() << std::endl;
+  return EXIT_FAILURE;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   binpose::server::Config config;
   CLI::App app("Trains models of parts and finds them in point clouds; serves binpose.v1 over gRPC.");
   binpose::server::add_options(app, config);
-  CLI11_PARSE(app, argc, argv);
-  binpose::server::log_to_stderr(config.log_level);
+  Action action = Action::kServe;
+  add_actions(app, action);
+  app.set_version_flag("--version", "binpose-server " BINPOSE_VERSION);
+  try {
+    app.parse(binpose::server::all_arguments(app, {argv + 1, argv + argc}));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  }
+  if (action == Action::kPrintConfig) {
+    std::cout << app.config_to_str(true);
+    return EXIT_SUCCESS;
+  }
+  if (action == Action::kCheckConfig) return report(check(config));
+  if (action == Action::kHealthcheck) return report(healthcheck(config));
+  using binpose::server::LogFormat;
+  log_to_stderr(config.log_level, config.log_format == "json" ? LogFormat::kJson : LogFormat::kText);
 
   // Before any thread starts, so that only sigwait() sees them.
   const sigset_t signals = end_signals();

@@ -1,9 +1,13 @@
 #include "server/metrics.h"
 
+#include "server/refusal.h"
+
 namespace binpose::server {
 namespace {
 
-constexpr std::array kMethodNames = {"Train", "GetModel", "ListModels", "DeleteModel", "Detect"};
+constexpr std::array kMethodNames = {"Train",       "GetModel",    "ListModels", "DeleteModel",
+                                     "ExportModel", "ImportModel", "Detect"};
+constexpr std::array kRefusalNames = {"queue_full", "deadline", "memory"};
 constexpr std::array kStageNames = {"preprocess", "vote", "cluster", "refine", "verify", "rank"};
 
 /// From a fast detection to a slow training, seconds.
@@ -20,19 +24,44 @@ prometheus::Gauge& gauge(prometheus::Registry& registry, const char* name, const
   return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add({});
 }
 
+prometheus::Gauge& waiting(prometheus::Registry& registry, const char* lane) {
+  return prometheus::BuildGauge()
+      .Name("binpose_queue_length")
+      .Help("Work that waits for a thread.")
+      .Register(registry)
+      .Add({{"lane", lane}});
+}
+
+prometheus::Histogram& cancels(prometheus::Registry& registry, const char* place) {
+  return durations(registry, "binpose_cancel_duration_seconds",
+                   "Time from a caller's cancel to the end of its work, by where the cancel caught it.")
+      .Add({{"place", place}}, duration_buckets());
+}
+
+prometheus::Counter& counter(prometheus::Registry& registry, const char* name, const char* help) {
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add({});
+}
+
 }  // namespace
 
 Metrics::Metrics()
     : queue_seconds_(durations(*registry_, "binpose_detect_queue_duration_seconds",
                                "Time between a frame's arrival and the start of its computation.")
                          .Add({}, duration_buckets())),
+      queue_cancel_seconds_(cancels(*registry_, "queue")),
+      compute_cancel_seconds_(cancels(*registry_, "compute")),
+      training_cancel_seconds_(cancels(*registry_, "training")),
+      points_(counter(*registry_, "binpose_detect_points_total", "Measured points in searched clouds.")),
+      hypotheses_(counter(*registry_, "binpose_detect_hypotheses_total", "Hypotheses that were answered.")),
       models_(gauge(*registry_, "binpose_models_loaded", "Models that are served.")),
+      model_bytes_(gauge(*registry_, "binpose_models_bytes", "Bytes of the files of the models that are served.")),
+      waiting_detections_(waiting(*registry_, "detections")),
+      waiting_trainings_(waiting(*registry_, "trainings")),
+      request_bytes_(gauge(*registry_, "binpose_requests_held_bytes", "Bytes of requests that wait or are computed.")),
+      resident_bytes_(gauge(*registry_, "process_resident_memory_bytes", "Resident memory of the process.")),
       streams_(gauge(*registry_, "binpose_detect_streams", "Detect streams that are open.")),
-      skipped_model_files_(prometheus::BuildCounter()
-                               .Name("binpose_model_files_skipped_total")
-                               .Help("Files in the model directory that could not be used.")
-                               .Register(*registry_)
-                               .Add({})) {
+      skipped_model_files_(counter(*registry_, "binpose_model_files_skipped_total",
+                                   "Times that a file in the model directory could not be used.")) {
   static_assert(kMethodNames.size() == kMethods && kStageNames.size() == kStages);
   auto& requests = prometheus::BuildCounter()
                        .Name("binpose_requests_total")
@@ -47,6 +76,17 @@ Metrics::Metrics()
     }
     request_seconds_[method] = &request_seconds.Add({{"method", kMethodNames[method]}}, duration_buckets());
   }
+  auto& refusals = prometheus::BuildCounter()
+                       .Name("binpose_refusals_total")
+                       .Help("Requests that were refused because the server was full, by what was full.")
+                       .Register(*registry_);
+  for (std::size_t i = 0; i < kRefusalNames.size(); ++i) refusals_[i] = &refusals.Add({{"reason", kRefusalNames[i]}});
+  prometheus::BuildGauge()
+      .Name("binpose_build_info")
+      .Help("Always 1; what runs is in the labels.")
+      .Register(*registry_)
+      .Add({{"version", BINPOSE_VERSION}})
+      .Set(1);
   auto& stage_seconds =
       durations(*registry_, "binpose_detect_stage_duration_seconds", "Compute time of a detection by stage.");
   for (int stage = 0; stage < kStages; ++stage) {
@@ -61,7 +101,20 @@ void Metrics::count_request(Method method, absl::StatusCode code, double seconds
   request_seconds_[index]->Observe(seconds);
 }
 
-void Metrics::observe_detection(const v1::DetectStats& stats) {
+void Metrics::count_refusal(const absl::Status& status) {
+  if (const auto reason = refusal_of(status)) refusals_[static_cast<std::size_t>(*reason)]->Increment();
+}
+
+void Metrics::observe_cancel(std::string_view place, double seconds) {
+  prometheus::Histogram& histogram = place == "queue"     ? queue_cancel_seconds_
+                                     : place == "compute" ? compute_cancel_seconds_
+                                                          : training_cancel_seconds_;
+  histogram.Observe(seconds);
+}
+
+void Metrics::observe_detection(const v1::DetectStats& stats, std::size_t hypotheses) {
+  points_.Increment(static_cast<double>(stats.point_count()));
+  hypotheses_.Increment(static_cast<double>(hypotheses));
   const std::array<double, kStages> stages = {stats.preprocess_seconds(), stats.vote_seconds(),
                                               stats.cluster_seconds(),    stats.refine_seconds(),
                                               stats.verify_seconds(),     stats.rank_seconds()};

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <memory>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "binpose/v1/detection_service.pb.h"
@@ -14,7 +15,7 @@
 namespace binpose::server {
 
 /// The methods that are measured.
-enum class Method { kTrain, kGetModel, kListModels, kDeleteModel, kDetect };
+enum class Method { kTrain, kGetModel, kListModels, kDeleteModel, kExportModel, kImportModel, kDetect };
 
 /// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
 class Metrics {
@@ -24,15 +25,24 @@ class Metrics {
   /// Counts a call that has ended, or a frame of a Detect stream that is answered.
   void count_request(Method method, absl::StatusCode code, double seconds);
   /// Notes where a detection spent its time.
-  void observe_detection(const v1::DetectStats& stats);
+  void observe_detection(const v1::DetectStats& stats, std::size_t hypotheses);
+  /// Notes a request that was refused; does nothing unless refused() made `status`.
+  void count_refusal(const absl::Status& status);
+  /// Notes how long after its cancel a request ended, and whether in "queue", "compute" or "training".
+  void observe_cancel(std::string_view place, double seconds);
 
   prometheus::Gauge& models() { return models_; }
+  prometheus::Gauge& model_bytes() { return model_bytes_; }
+  prometheus::Gauge& waiting_detections() { return waiting_detections_; }
+  prometheus::Gauge& waiting_trainings() { return waiting_trainings_; }
+  prometheus::Gauge& request_bytes() { return request_bytes_; }
+  prometheus::Gauge& resident_bytes() { return resident_bytes_; }
   prometheus::Gauge& streams() { return streams_; }
   prometheus::Counter& skipped_model_files() { return skipped_model_files_; }
   std::shared_ptr<prometheus::Registry> registry() const { return registry_; }
 
  private:
-  static constexpr int kMethods = 5;
+  static constexpr int kMethods = 7;
   static constexpr int kCodes = 17;
   static constexpr int kStages = 6;
 
@@ -41,7 +51,18 @@ class Metrics {
   std::array<prometheus::Histogram*, kMethods> request_seconds_;
   std::array<prometheus::Histogram*, kStages> stage_seconds_;
   prometheus::Histogram& queue_seconds_;
+  std::array<prometheus::Counter*, 3> refusals_;
+  prometheus::Histogram& queue_cancel_seconds_;
+  prometheus::Histogram& compute_cancel_seconds_;
+  prometheus::Histogram& training_cancel_seconds_;
+  prometheus::Counter& points_;
+  prometheus::Counter& hypotheses_;
   prometheus::Gauge& models_;
+  prometheus::Gauge& model_bytes_;
+  prometheus::Gauge& waiting_detections_;
+  prometheus::Gauge& waiting_trainings_;
+  prometheus::Gauge& request_bytes_;
+  prometheus::Gauge& resident_bytes_;
   prometheus::Gauge& streams_;
   prometheus::Counter& skipped_model_files_;
 };

@@ -54,14 +54,12 @@ absl::Status check_header(const Header& header, std::size_t file_bytes) {
 
 }  // namespace
 
-std::string seal_envelope(StoredModel& stored) {
+std::string seal_envelope(const StoredModel& stored) {
   const std::string payload = serialize_model(stored.model);
   Header header;
   header.generation = stored.generation;
   header.create_time = stored.create_time.time_since_epoch().count();
   header.payload_bytes = payload.size();
-  stored.content_hash = content_hash(stored.model);
-  stored.file_bytes = kPayloadStart + payload.size();
   return as_bytes(header) + checksum(header, payload) + payload;
 }
 

@@ -10,8 +10,8 @@
 /// writes it. One SHA-256 covers all of it. The ID is the file's name only, so that files can be copied and renamed.
 namespace binpose::server {
 
-/// Fills in content hash and size as well.
-std::string seal_envelope(StoredModel& stored);
+/// Heeds generation, time and model.
+std::string seal_envelope(const StoredModel& stored);
 
 /// The model of such bytes.
 ///

@@ -7,6 +7,8 @@
 
 #include "server/clock.h"
 #include "server/convert_training.h"
+#include "server/log.h"
+#include "server/model_transfer.h"
 #include "server/status.h"
 #include "server/train_call.h"
 
@@ -31,7 +33,6 @@ absl::Status get_model(const ModelStore& models, const std::string& id, v1::Mode
 absl::Status delete_model(const Backend& backend, const std::string& id) {
   if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   if (absl::Status status = backend.models.remove(id); !status.ok()) return status;
-  backend.metrics.models().Set(static_cast<double>(backend.models.size()));
   spdlog::info("deleted {}", id);
   return absl::OkStatus();
 }
@@ -40,14 +41,27 @@ absl::Status delete_model(const Backend& backend, const std::string& id) {
 
 grpc::ServerWriteReactor<v1::TrainResponse>* ModelService::Train(grpc::CallbackServerContext* context,
                                                                  const v1::TrainRequest* request) {
-  return new TrainCall(*request, backend_, compute_deadline(context->deadline()));
+  return new TrainCall(*request, backend_, backend_.tokens.check(*context, Role::kTrain),
+                       compute_deadline(context->deadline()), trace_id_of(*context));
+}
+
+grpc::ServerWriteReactor<v1::ExportModelResponse>* ModelService::ExportModel(grpc::CallbackServerContext* context,
+                                                                             const v1::ExportModelRequest* request) {
+  return new ExportCall(request->id(), backend_, backend_.tokens.check(*context, Role::kTrain));
+}
+
+grpc::ServerReadReactor<v1::ImportModelRequest>* ModelService::ImportModel(grpc::CallbackServerContext* context,
+                                                                           v1::ImportModelResponse* response) {
+  return new ImportCall(*response, backend_, backend_.tokens.check(*context, Role::kTrain));
 }
 
 grpc::ServerUnaryReactor* ModelService::GetModel(grpc::CallbackServerContext* context,
                                                  const v1::GetModelRequest* request, v1::Model* response) {
   const Clock::time_point arrival = Clock::now();
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  finish(reactor, backend_.metrics, Method::kGetModel, arrival, get_model(backend_.models, request->id(), *response));
+  absl::Status status = backend_.tokens.check(*context, Role::kDetect);
+  if (status.ok()) status = get_model(backend_.models, request->id(), *response);
+  finish(reactor, backend_.metrics, Method::kGetModel, arrival, status);
   return reactor;
 }
 
@@ -56,8 +70,11 @@ grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* 
                                                    v1::ListModelsResponse* response) {
   const Clock::time_point arrival = Clock::now();
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  for (const auto& stored : backend_.models.list()) *response->add_models() = to_proto(*stored);
-  finish(reactor, backend_.metrics, Method::kListModels, arrival, absl::OkStatus());
+  const absl::Status allowed = backend_.tokens.check(*context, Role::kDetect);
+  if (allowed.ok()) {
+    for (const auto& stored : backend_.models.list()) *response->add_models() = to_proto(*stored);
+  }
+  finish(reactor, backend_.metrics, Method::kListModels, arrival, allowed);
   return reactor;
 }
 
@@ -66,6 +83,10 @@ grpc::ServerUnaryReactor* ModelService::DeleteModel(grpc::CallbackServerContext*
                                                     v1::DeleteModelResponse* /*response*/) {
   const Clock::time_point arrival = Clock::now();
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (absl::Status allowed = backend_.tokens.check(*context, Role::kTrain); !allowed.ok()) {
+    finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, allowed);
+    return reactor;
+  }
   const auto call = std::make_shared<Drain::Call>(backend_.drain);
   // On the pool, because it waits for the disk.
   const absl::Status admitted = backend_.detections.submit([this, call, reactor, arrival, id = request->id()] {

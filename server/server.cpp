@@ -3,15 +3,20 @@
 #include <google/protobuf/generated_message_reflection.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "grpc/health/v1/health.pb.h"
+#include "server/tls.h"
 
 namespace binpose::server {
 namespace {
@@ -32,51 +37,98 @@ void enable_standard_services() {
   google::protobuf::LinkMessageReflection<grpc::health::v1::HealthCheckRequest>();
 }
 
+/// Asks a silent peer whether it is there, so that the calls of one that vanished end within a minute.
+void reap_dead_peers(grpc::ServerBuilder& builder) {
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+}
+
+/// 0 where the system does not tell.
+double resident_bytes() {
+  double total_pages = 0;
+  double resident_pages = 0;
+  std::ifstream("/proc/self/statm") >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const Config& config) {
-  absl::StatusOr<std::unique_ptr<ModelStore>> models = ModelStore::open(config.model_dir);
-  if (!models.ok()) return models.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(models)));
+  if (absl::Status status = check(config); !status.ok()) return status;
+  std::unique_ptr<Server> server(new Server(config));
+  // Metrics first, so that it can be seen that the server lives and is not ready.
   if (absl::Status status = server->serve_metrics(); !status.ok()) return status;
+  if (absl::Status status = server->load(); !status.ok()) return status;
   if (absl::Status status = server->listen(); !status.ok()) return status;
+  server->is_ready_ = true;
   spdlog::info("serving {} models from {} on {}", server->models_->size(), config.model_dir.string(),
                server->address());
   return server;
 }
 
-Server::Server(const Config& config, std::unique_ptr<ModelStore> models)
+Server::Server(const Config& config)
     : config_(config),
-      models_(std::move(models)),
+      requests_(static_cast<std::size_t>(config.request_memory_mib) << 20),
       detections_("detections", config.threads, static_cast<std::size_t>(config.queue)),
-      trainings_("trainings", 1, kTrainingQueue),
-      model_service_({*models_, detections_, trainings_, metrics_, drain_}),
-      detection_service_({*models_, detections_, trainings_, metrics_, drain_}) {
-  metrics_.models().Set(static_cast<double>(models_->size()));
-  metrics_.skipped_model_files().Increment(static_cast<double>(models_->skipped_files()));
+      trainings_("trainings", 1, kTrainingQueue, ComputePool::Priority::kLow) {}
+
+Server::~Server() {
+  stop();
+  metrics_endpoint_.reset();  // it reads the rest
 }
 
-Server::~Server() { stop(); }
+absl::Status Server::load() {
+  if (absl::Status status = tokens_.load(config_.token_file); !status.ok()) return status;
+  absl::StatusOr<std::unique_ptr<ModelStore>> models = ModelStore::open(
+      config_.model_dir,
+      {.total_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20, .load_threads = config_.threads});
+  if (!models.ok()) return models.status();
+  models_ = *std::move(models);
+  const Backend backend = {*models_, detections_, trainings_, requests_, tokens_, metrics_, drain_};
+  model_service_ = std::make_unique<ModelService>(backend);
+  detection_service_ = std::make_unique<DetectionService>(backend);
+  return absl::OkStatus();
+}
 
 absl::Status Server::serve_metrics() {
   if (config_.metrics.empty()) return absl::OkStatus();
   absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
-      MetricsEndpoint::start(config_.metrics, metrics_.registry());
+      MetricsEndpoint::start(config_.metrics, {.registry = metrics_.registry(),
+                                               .before_scrape = [this] { update_metrics(); },
+                                               .is_ready = [this] { return is_ready_.load(); }});
   if (!endpoint.ok()) return endpoint.status();
   metrics_endpoint_ = *std::move(endpoint);
   metrics_address_ = with_port(config_.metrics, metrics_endpoint_->port());
   return absl::OkStatus();
 }
 
+void Server::update_metrics() {
+  metrics_.waiting_detections().Set(static_cast<double>(detections_.waiting()));
+  metrics_.waiting_trainings().Set(static_cast<double>(trainings_.waiting()));
+  metrics_.request_bytes().Set(static_cast<double>(requests_.used()));
+  metrics_.resident_bytes().Set(resident_bytes());
+  if (!is_ready_) return;
+  metrics_.models().Set(static_cast<double>(models_->size()));
+  metrics_.model_bytes().Set(static_cast<double>(models_->total_bytes()));
+  prometheus::Counter& skipped = metrics_.skipped_model_files();
+  skipped.Increment(std::max(0.0, static_cast<double>(models_->skipped_files()) - skipped.Value()));
+}
+
 absl::Status Server::listen() {
   enable_standard_services();
   int port = 0;
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(config_.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(config_.listen, server_credentials(config_), &port);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // two servers on one port would share its calls
   builder.SetMaxReceiveMessageSize(config_.max_message_mib << 20);
-  builder.RegisterService(&model_service_);
-  builder.RegisterService(&detection_service_);
+  // Messages that are being received count here, not yet in requests_; above it gRPC stops reading, then drops calls.
+  const std::size_t largest = static_cast<std::size_t>(config_.max_message_mib) << 20;
+  const std::size_t held = static_cast<std::size_t>(config_.request_memory_mib) << 20;
+  builder.SetResourceQuota(grpc::ResourceQuota("binpose").Resize(held + 2 * largest));
+  reap_dead_peers(builder);
+  builder.RegisterService(model_service_.get());
+  builder.RegisterService(detection_service_.get());
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr || port == 0) {
     return absl::UnavailableError(
@@ -91,6 +143,7 @@ absl::Status Server::listen() {
 
 void Server::stop() {
   if (grpc_server_ == nullptr) return;
+  is_ready_ = false;
   grpc_server_->GetHealthCheckService()->SetServingStatus(false);
   drain_.start();
   if (!drain_.wait_for_calls(std::chrono::seconds(config_.drain_timeout_seconds))) {

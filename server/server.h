@@ -2,6 +2,7 @@
 
 #include <grpcpp/server.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -31,18 +32,23 @@ class Server {
   void stop();
 
  private:
-  Server(const Config& config, std::unique_ptr<ModelStore> models);
-  absl::Status listen();
+  explicit Server(const Config& config);
   absl::Status serve_metrics();
+  absl::Status load();
+  absl::Status listen();
+  void update_metrics();
 
   const Config config_;
   Metrics metrics_;
   Drain drain_;
+  MemoryBudget requests_;
+  Tokens tokens_;
   std::unique_ptr<ModelStore> models_;
   ComputePool detections_;
   ComputePool trainings_;
-  ModelService model_service_;
-  DetectionService detection_service_;
+  std::unique_ptr<ModelService> model_service_;
+  std::unique_ptr<DetectionService> detection_service_;
+  std::atomic<bool> is_ready_ = false;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
   std::unique_ptr<grpc::Server> grpc_server_;
   std::string address_;

@@ -7,6 +7,7 @@
 
 #include "core/train/train.h"
 #include "server/convert_training.h"
+#include "server/log.h"
 #include "server/status.h"
 
 namespace binpose::server {
@@ -17,15 +18,29 @@ constexpr double kComputeShare = 0.95;
 
 }  // namespace
 
-TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, std::optional<Clock::time_point> deadline)
-    : request_(request), backend_(backend), deadline_(deadline), call_(backend.drain) {
-  if (const absl::Status admitted = admit(); !admitted.ok()) end(admitted);
+TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, const absl::Status& allowed,
+                     std::optional<Clock::time_point> deadline, std::string trace_id)
+    : request_(request), backend_(backend), deadline_(deadline), trace_id_(std::move(trace_id)), call_(backend.drain) {
+  if (const absl::Status admitted = admit(allowed); !admitted.ok()) {
+    backend_.metrics.count_refusal(admitted);
+    end(admitted);
+  }
 }
 
-absl::Status TrainCall::admit() {
+absl::Status TrainCall::admit(const absl::Status& allowed) {
+  if (!allowed.ok()) return allowed;
   if (backend_.drain.started()) return absl::UnavailableError(kEnding);
+  absl::StatusOr<MemoryBudget::Share> memory = backend_.requests.take(request_.mesh().data().size());
+  if (!memory.ok()) return memory.status();
+  memory_ = *std::move(memory);
   report(v1::TRAIN_STAGE_QUEUED, 0);
-  return backend_.trainings.submit([this] { run(); });
+  return backend_.trainings.submit([this] { run(); }, {.stop = stop_.get_token(), .deadline = deadline_});
+}
+
+void TrainCall::OnCancel() {
+  cancel_time_ = Clock::now();
+  stop_.request_stop();
+  backend_.trainings.run_stopped();
 }
 
 void TrainCall::OnWriteDone(bool /*ok*/) {
@@ -33,12 +48,14 @@ void TrainCall::OnWriteDone(bool /*ok*/) {
 }
 
 void TrainCall::run() {
+  const LogTrace log_trace(trace_id_);
   const absl::StatusOr<v1::Model> outcome = contain_exceptions([this] { return train_and_save(); });
   if (outcome.ok()) {
     spdlog::info("trained {} generation {} in {:.2f} s", outcome->id(), outcome->generation(), seconds_since(arrival_));
   } else {
-    spdlog::warn("training failed: {}", std::string(outcome.status().message()));
+    log_failure("training of " + request_.id(), outcome.status());
   }
+  if (absl::IsCancelled(outcome.status())) backend_.metrics.observe_cancel("training", seconds_since(cancel_time_));
   end(outcome);
 }
 
@@ -62,7 +79,6 @@ absl::StatusOr<v1::Model> TrainCall::train_and_save() {
   report(v1::TRAIN_STAGE_SAVING, kComputeShare);
   const auto stored = backend_.models.put(request_.id(), *std::move(model));
   if (!stored.ok()) return stored.status();
-  backend_.metrics.models().Set(static_cast<double>(backend_.models.size()));
   return to_proto(**stored);
 }
 

@@ -2,9 +2,11 @@
 
 #include <grpcpp/support/server_callback.h>
 
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include "absl/status/statusor.h"
 #include "binpose/v1/model_service.pb.h"
@@ -16,15 +18,18 @@ namespace binpose::server {
 /// One Train call: trains on the pool, reports progress, saves. Deletes itself when the call is over.
 class TrainCall final : public grpc::ServerWriteReactor<v1::TrainResponse> {
  public:
-  /// @param request  lives until OnDone().
-  TrainCall(const v1::TrainRequest& request, const Backend& backend, std::optional<Clock::time_point> deadline);
+  /// @param request   lives until OnDone().
+  /// @param allowed   an error ends the call with it.
+  /// @param trace_id  goes into the log.
+  TrainCall(const v1::TrainRequest& request, const Backend& backend, const absl::Status& allowed,
+            std::optional<Clock::time_point> deadline, std::string trace_id);
 
   void OnWriteDone(bool ok) override;
-  void OnCancel() override { stop_.request_stop(); }
+  void OnCancel() override;
   void OnDone() override { delete this; }
 
  private:
-  absl::Status admit();
+  absl::Status admit(const absl::Status& allowed);
   void run();
   absl::StatusOr<v1::Model> train_and_save();
   void report(v1::TrainStage stage, double progress);
@@ -36,6 +41,9 @@ class TrainCall final : public grpc::ServerWriteReactor<v1::TrainResponse> {
   Backend backend_;
   const std::optional<Clock::time_point> deadline_;
   const Clock::time_point arrival_ = Clock::now();
+  const std::string trace_id_;
+  MemoryBudget::Share memory_;
+  std::atomic<Clock::time_point> cancel_time_ = Clock::time_point::max();  ///< set before the stop is requested
   std::stop_source stop_;
   v1::TrainResponse outgoing_;
 

@@ -2,7 +2,24 @@
 
 #include <iostream>
 
+#include "client/read_file.h"
+
 namespace binpose::client::cli {
+
+namespace {
+
+/// The file's text; empty without a file.
+std::string text_of(const std::string& file) {
+  if (file.empty()) return "";
+  const absl::StatusOr<std::string> text = read_file(file);
+  if (text.ok()) return *text;
+  report(text.status());
+  throw CLI::RuntimeError(kUnreadable);
+}
+
+std::string first_line(const std::string& text) { return text.substr(0, text.find_first_of("\r\n")); }
+
+}  // namespace
 
 Client connect(const GlobalOptions& global) {
   Timeouts timeouts;
@@ -10,7 +27,12 @@ Client connect(const GlobalOptions& global) {
     const std::chrono::milliseconds timeout(static_cast<std::int64_t>(1000 * *global.timeout_seconds));
     timeouts = {.call = timeout, .training = timeout, .answer = timeout};
   }
-  return Client(global.server, timeouts);
+  return Client(Connection{.server = global.server,
+                           .tls_ca = text_of(global.tls_ca),
+                           .tls_cert = text_of(global.tls_cert),
+                           .tls_key = text_of(global.tls_key),
+                           .token = first_line(text_of(global.token_file))},
+                timeouts);
 }
 
 void report(const absl::Status& error) { std::cerr << "binpose: " << error.message() << std::endl; }

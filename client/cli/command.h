@@ -18,6 +18,10 @@ struct GlobalOptions {
   std::string server = "localhost:50051";
   bool json = false;
   std::optional<double> timeout_seconds;
+  std::string tls_ca;
+  std::string tls_cert;
+  std::string tls_key;
+  std::string token_file;
 };
 
 /// What the shell gets to see.
@@ -36,9 +40,12 @@ void add_detect(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_models(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_model(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_delete(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_export(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_import(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_request(CLI::App& app, const GlobalOptions& global, Command& chosen);
 
-/// A client for the server that the user named.
+/// A client for the server that the user named. Throws CLI::RuntimeError when a file of certificates or the token
+/// cannot be read.
 Client connect(const GlobalOptions& global);
 
 /// Prints "binpose: <sentence>" to standard error.

@@ -29,19 +29,30 @@ int run(int argc, char** argv) {
   app.add_flag("--json", global.json, "Print the answers as JSON, one object per line");
   app.add_option("--timeout", global.timeout_seconds, "Seconds to wait for an answer; for a training: for all of it")
       ->check(CLI::Range(0.001, 1e6));
+  app.add_option("--tls-ca", global.tls_ca, "PEM file of the authorities that vouch for the server; else plaintext");
+  app.add_option("--tls-cert", global.tls_cert, "PEM file of the certificate that the server asks for");
+  app.add_option("--tls-key", global.tls_key, "PEM file of its key");
+  app.add_option("--token-file", global.token_file, "File whose first line is the bearer token")
+      ->envname("BINPOSE_CLIENT_TOKEN_FILE");
   Command chosen;
   add_train(app, global, chosen);
   add_detect(app, global, chosen);
   add_models(app, global, chosen);
   add_model(app, global, chosen);
   add_delete(app, global, chosen);
+  add_export(app, global, chosen);
+  add_import(app, global, chosen);
   add_request(app, global, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
-  return chosen();
+  try {
+    return chosen();
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();
+  }
 }
 
 }  // namespace

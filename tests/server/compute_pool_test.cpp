@@ -3,7 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <latch>
+#include <stop_token>
+#include <thread>
+
+#include "server/memory_budget.h"
+#include "server/refusal.h"
 
 namespace binpose::server {
 namespace {
@@ -33,6 +39,64 @@ TEST(ComputePool, RefusesWhatTheQueueCannotHoldAndSaysSo) {
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused.message(), "The server is full: 2 tasks wait already; try again later.");
   may_end.count_down();
+}
+
+/// One that is busy and knows that a task takes about 20 ms.
+class BusyPoolTest : public ::testing::Test {
+ protected:
+  BusyPoolTest() {
+    std::latch learnt(1);
+    EXPECT_TRUE(pool_.submit([] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); }).ok());
+    EXPECT_TRUE(pool_.submit([&] { learnt.count_down(); }).ok());
+    learnt.wait();
+    std::latch running(1);
+    EXPECT_TRUE(pool_
+                    .submit([&] {
+                      running.count_down();
+                      may_end_.wait();
+                    })
+                    .ok());
+    running.wait();
+  }
+  ~BusyPoolTest() override { may_end_.count_down(); }
+
+  std::latch may_end_{1};
+  ComputePool pool_{"tasks", 1, 10};
+};
+
+TEST_F(BusyPoolTest, RefusesATaskThatWouldEndAfterItsDeadlineAndSaysWhenToComeAgain) {
+  EXPECT_TRUE(pool_.submit([] {}, {.deadline = Clock::now() + std::chrono::hours(1)}).ok());
+  const absl::Status refused = pool_.submit([] {}, {.deadline = Clock::now() + std::chrono::milliseconds(1)});
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refusal_of(refused), Refusal::kDeadline);
+  EXPECT_GT(retry_info_of(refused)->retry_delay().nanos(), 0);
+}
+
+TEST_F(BusyPoolTest, ACallerThatHasGoneFreesItsPlaceWhileThePoolIsBusy) {
+  std::stop_source caller;
+  bool ran = false;
+  ASSERT_TRUE(pool_.submit([&] { ran = true; }, {.stop = caller.get_token()}).ok());
+  ASSERT_TRUE(pool_.submit([] {}).ok());
+  pool_.run_stopped();
+  EXPECT_EQ(pool_.waiting(), 2);
+  caller.request_stop();
+  pool_.run_stopped();
+  EXPECT_TRUE(ran);
+  EXPECT_EQ(pool_.waiting(), 1);
+}
+
+TEST(MemoryBudget, HoldsWhatSharesTakeAndGetsItBack) {
+  MemoryBudget budget(100);
+  {
+    auto share = budget.take(60);
+    ASSERT_TRUE(share.ok());
+    const absl::Status refused = budget.take(41).status();
+    EXPECT_EQ(refusal_of(refused), Refusal::kMemory);
+    EXPECT_TRUE(budget.take(40).ok());
+    const MemoryBudget::Share moved = *std::move(share);
+    EXPECT_EQ(budget.used(), 60);
+  }
+  EXPECT_EQ(budget.used(), 0);
 }
 
 TEST(ComputePool, SharesItsThreadsAmongWhatRunsAndWaits) {

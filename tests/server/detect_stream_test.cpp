@@ -42,7 +42,7 @@ class StreamServer final : public v1::DetectionService::WithRawCallbackMethod_De
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Detect(
       grpc::CallbackServerContext* /*context*/) override {
-    return new DetectStream(*this, pool_, drain_, streams_, std::nullopt);
+    return new DetectStream({*this, pool_, memory_, drain_, streams_}, std::nullopt, "");
   }
 
  private:
@@ -59,7 +59,10 @@ class StreamServer final : public v1::DetectionService::WithRawCallbackMethod_De
     return encode(response);
   }
 
+  void note_cancel(CancelPlace /*place*/, double /*seconds*/) override {}
+
   Answer answer_;
+  MemoryBudget memory_{std::size_t{1} << 30};
   Drain drain_;
   prometheus::Gauge streams_;
   ComputePool pool_;

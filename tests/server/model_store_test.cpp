@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <thread>
 
 #include "core/io/model_file.h"
 #include "core/io/read_mesh.h"
@@ -133,7 +136,7 @@ TEST_F(ModelStoreTest, SkipsAndCountsWhatIsNoModelAndDeletesNothing) {
   const auto store = open_store(path());
   EXPECT_EQ(store->size(), 1);
   EXPECT_TRUE(store->find("good").ok());
-  EXPECT_EQ(store->skipped_files(), 10);
+  EXPECT_EQ(store->skipped_files(), 9);  // all but what is being written
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path()), {}), 12);
 }
 
@@ -155,6 +158,58 @@ TEST_F(ModelStoreTest, AFileCanBeCopiedUnderAnotherId) {
   ASSERT_TRUE(open_store(path())->put("block", block()).ok());
   std::filesystem::copy(path() / "block.model", path() / "copy.model");
   EXPECT_EQ(open_store(path())->find("copy").value()->id, "copy");
+}
+
+/// Whether `condition` comes true within the time that following the directory may take.
+bool soon(const std::function<bool()>& condition) {
+  for (int i = 0; i < 1000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return condition();
+}
+
+TEST_F(ModelStoreTest, FollowsWhatAnotherServerPutsReplacesAndRemoves) {
+  const auto store = open_store(path());
+  const auto other = open_store(path());
+  ASSERT_TRUE(other->put("block", block()).ok());
+  EXPECT_TRUE(soon([&] { return store->find("block").ok(); }));
+  ASSERT_TRUE(other->put("block", block()).ok());
+  EXPECT_TRUE(soon([&] { return store->find("block").value()->generation == 2; }));
+  ASSERT_TRUE(other->remove("block").ok());
+  EXPECT_TRUE(soon([&] { return !store->find("block").ok(); }));
+}
+
+TEST_F(ModelStoreTest, TwoServersThatTrainTheSameIdCountGenerationsTogether) {
+  const auto store = open_store(path());
+  const auto other = open_store(path());
+  ASSERT_EQ(other->put("block", block()).value()->generation, 1);
+  EXPECT_EQ(store->put("block", block()).value()->generation, 2);
+  EXPECT_EQ(other->put("block", block()).value()->generation, 3);
+}
+
+TEST_F(ModelStoreTest, AFileThatIsTornWhileItIsCopiedNeverTakesTheModelsPlace) {
+  const auto store = open_store(path());
+  ASSERT_TRUE(store->put("block", block()).ok());
+  const std::string good = read(path() / "block.model");
+  write(path() / "block.model", good.substr(0, good.size() / 2));
+  EXPECT_TRUE(soon([&] { return store->skipped_files() == 1; }));
+  EXPECT_TRUE(store->find("block").ok());
+}
+
+TEST_F(ModelStoreTest, AModelOverTheMemoryBudgetIsRefusedAndTheOthersStay) {
+  const std::size_t bytes = open_store(path())->put("block", block()).value()->file_bytes;
+  const auto store = ModelStore::open(path(), {.total_bytes = bytes + bytes / 2}).value();
+  const auto refused = store->put("second", block());
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(refused.status().message()), HasSubstr("--models-memory-mib"));
+  EXPECT_FALSE(std::filesystem::exists(path() / "second.model"));
+  EXPECT_TRUE(store->put("block", block()).ok());  // in its own place
+}
+
+TEST_F(ModelStoreTest, LoadsOnSeveralThreadsWhatOneThreadLoads) {
+  {
+    const auto store = open_store(path());
+    for (int i = 0; i < 20; ++i) ASSERT_TRUE(store->put("block" + std::to_string(i), block()).ok());
+  }
+  EXPECT_EQ(ModelStore::open(path(), {.load_threads = 4}).value()->size(), 20);
 }
 
 TEST(CheckModelId, TakesWhatTheRuleAllowsAndNothingElse) {
