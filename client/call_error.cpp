@@ -18,6 +18,11 @@ std::string explain(const grpc::Status& status, const std::string& server) {
       if (status.error_message().find("larger than max") != std::string::npos) {
         return status.error_message() + ". Send less, or raise the server's --max-message-mib.";
       }
+      // ENHANCE_YOUR_CALM: what gRPC says when its memory is full before the message is there.
+      if (status.error_message().find("RST_STREAM with error code 11") != std::string::npos) {
+        return "the server's memory for requests is full. Send less, try again later, or raise the server's "
+               "--request-memory-mib.";
+      }
       return status.error_message();
     default:
       return status.error_message();

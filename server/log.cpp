@@ -131,6 +131,7 @@ LogRequest::LogRequest(std::string_view id) { request_id = id; }
 LogRequest::~LogRequest() { request_id.clear(); }
 
 void log_failure(std::string_view what, const absl::Status& status) {
+  if (absl::IsCancelled(status)) return;  // the caller's wish
   static RateLimit limit;
   const int held_back = limit.pass();
   if (held_back < 0) return;

@@ -39,7 +39,8 @@ class LogRequest {
   LogRequest& operator=(const LogRequest&) = delete;
 };
 
-/// Logs that `what`, for example "a detection", failed; at most some lines a second, so that no client fills the disk.
+/// Logs that `what`, for example "a detection", failed, unless its caller cancelled it; at most some lines a second, so
+/// that no client fills the disk.
 void log_failure(std::string_view what, const absl::Status& status);
 
 }  // namespace binpose::server

@@ -12,10 +12,10 @@ BIN = Path(os.environ["BINPOSE_BIN"])  # set by ctest: where the build put its b
 class Server:
     """binpose-server on free ports; `address` and `metrics` are where it listens."""
 
-    def __init__(self, model_dir):
+    def __init__(self, model_dir, *arguments):
         self._process = subprocess.Popen(
             [BIN / "binpose-server", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0", "--model-dir", model_dir,
-             "--threads", "1"],
+             "--threads", "1", "--log-level", "warning", *arguments],
             stdout=subprocess.PIPE, text=True)
         first_line = self._process.stdout.readline()  # "listening on HOST:PORT, metrics on HOST:PORT"
         self.address, self.metrics = (part.split(" on ")[1] for part in first_line.strip().split(", "))
@@ -26,6 +26,19 @@ class Server:
         status = self._process.wait(timeout=60)
         self._process.stdout.close()
         return status
+
+    def kill(self):
+        """Ends it at once, as a power cut would."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+    def resident_bytes(self):
+        return 4096 * int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[1])
+
+    def thread_count(self):
+        return len(list(Path(f"/proc/{self._process.pid}/task").iterdir()))
 
     def binpose(self, *arguments):
         """Runs the client; returns the finished process with its output as text."""

@@ -1,0 +1,398 @@
+"""What the service promises under load, faults and abuse. BINPOSE_STRESS=full runs the issue's whole figures, else a
+short form; each test prints its figure as one line that starts with its name."""
+
+import concurrent.futures
+import math
+import os
+import random
+import shutil
+import struct
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+import urllib.request
+from pathlib import Path
+
+import grpc
+
+import wire
+from binpose_process import BIN, Server
+from wire import Api, scan_request
+
+FULL = os.environ.get("BINPOSE_STRESS") == "full"
+BUF = BIN.parent / "node_modules/.bin/buf"
+KEPT = {}  # the trained model's bytes, so that it is trained once
+
+
+def figure(name, text):
+    print(f"{name}: {text}", flush=True)
+
+
+def metric(server, name):
+    """Sum of a metric's series whose line starts with `name`."""
+    with urllib.request.urlopen(f"http://{server.metrics}/metrics", timeout=30) as page:
+        lines = page.read().decode().splitlines()
+    return sum(float(line.rsplit(" ", 1)[1]) for line in lines if line.startswith(name))
+
+
+def percentile(values, share):
+    return sorted(values)[min(len(values) - 1, math.ceil(share * len(values)) - 1)]
+
+
+def answer(api, request, **options):
+    """One frame's answer over a stream of its own, and the seconds that it took."""
+    start = time.monotonic()
+    [response] = api.detect([request], **options)
+    return response, time.monotonic() - start
+
+
+class StressTest(unittest.TestCase):
+    arguments = []
+
+    def setUp(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        self.directory = Path(directory.name)
+        self.server = self.start()
+        self.api = Api(self.server.address)
+        if not KEPT:
+            for message in self.api.train("part"):
+                pass
+            KEPT["model"] = self.api.export_model("part")
+        else:
+            self.api.import_model("part", KEPT["model"])
+        self.request = scan_request(self.server.binpose)
+
+    def start(self):
+        server = Server(self.directory, *self.arguments)
+        self.addCleanup(server.kill)
+        return server
+
+    def assert_serves(self):
+        response, _ = answer(self.api, self.request, timeout=60)
+        self.assertTrue(response.hypotheses, response.error)
+
+
+class OverloadTest(StressTest):
+    arguments = ["--queue", "2"]
+
+    def capacity(self):
+        """Answers a second when two callers keep the server just busy."""
+        seconds = 10 if FULL else 4
+        end = time.monotonic() + seconds
+        counts = []
+
+        def ask(_):
+            api = Api(self.server.address)
+            while time.monotonic() < end:
+                answer(api, self.request)
+                counts.append(1)
+
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            list(pool.map(ask, range(2)))
+        return len(counts) / seconds
+
+    def test_overload_keeps_goodput_and_refuses_at_once(self):
+        capacity = self.capacity()
+        seconds = 60 if FULL else 8
+        end = time.monotonic() + seconds
+        good, refused, hints = [], [], []
+
+        def press(_):
+            api = Api(self.server.address)
+            while time.monotonic() < end:
+                response, took = answer(api, self.request)
+                if response.hypotheses:
+                    good.append(took)
+                else:
+                    refused.append(took)
+                    hints.append(response.error.HasField("retry_info"))
+                    time.sleep(1 / capacity)  # clients that heed the hint ask about as often as the server answers
+
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            list(pool.map(press, range(8)))
+        offered = (len(good) + len(refused)) / seconds / capacity
+        goodput = len(good) / seconds / capacity
+        start = time.monotonic()
+        self.assert_serves()
+        figure("overload", f"offered {offered:.1f} x capacity, goodput {100 * goodput:.0f} %, "
+               f"refusals p99 {1000 * percentile(refused, 0.99):.0f} ms, recovered in {time.monotonic() - start:.2f} s")
+        self.assertGreater(goodput, 0.75)
+        self.assertTrue(all(hints) and hints)
+
+
+class TrainingBesideTest(StressTest):
+    arguments = ["--threads", "1"]
+
+    def test_detections_beside_trainings(self):
+        count = 200 if FULL else 30
+        alone = [answer(self.api, self.request)[1] for _ in range(count)]
+        stop = threading.Event()
+
+        def train():
+            api = Api(self.server.address)
+            while not stop.is_set():
+                for message in api.train("other"):
+                    pass
+
+        thread = threading.Thread(target=train)
+        thread.start()
+        time.sleep(0.5)
+        beside = [answer(self.api, self.request)[1] for _ in range(count)]
+        stop.set()
+        thread.join()
+        ratio = percentile(beside, 0.99) / percentile(alone, 0.99)
+        figure("training beside", f"p99 {1000 * percentile(alone, 0.99):.0f} ms alone, "
+               f"{1000 * percentile(beside, 0.99):.0f} ms beside a training loop, ratio {ratio:.2f}")
+        self.assertTrue(beside)
+
+
+class ReplaceTest(StressTest):
+    def test_replacing_a_model_fails_no_request(self):
+        count = 1000 if FULL else 60
+        stop = threading.Event()
+        errors, answers = [], []
+
+        def detect():
+            api = Api(self.server.address)
+            while not stop.is_set():
+                response, _ = answer(api, self.request)
+                answers.append(1)
+                if not response.hypotheses:
+                    errors.append(response.error)
+
+        thread = threading.Thread(target=detect)
+        thread.start()
+        for _ in range(count):
+            self.api.import_model("part", KEPT["model"])
+        stop.set()
+        thread.join()
+        figure("replace", f"{count} replacements, {len(answers)} detections meanwhile, {len(errors)} failed")
+        self.assertEqual(errors, [])
+        self.assertEqual(self.api.models()[0].generation, count + 1)
+
+
+class CancelTest(StressTest):
+    def test_cancelled_calls_leave_nothing_behind(self):
+        count = 1000 if FULL else 60
+        dice = random.Random(1)
+        for _ in range(count):
+            call = self.api.detect([self.request])
+            time.sleep(dice.uniform(0, 0.3))
+            call.cancel()
+        self.assert_serves()
+        deadline = time.monotonic() + 20
+        while metric(self.server, "binpose_detect_streams") > 0 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        seen = metric(self.server, "binpose_cancel_duration_seconds_count")
+        within = metric(self.server, 'binpose_cancel_duration_seconds_bucket{place="compute",le="0.01"}')
+        computed = metric(self.server, 'binpose_cancel_duration_seconds_count{place="compute"}')
+        figure("cancel", f"{count} cancels, {seen:.0f} caught at work, of {computed:.0f} in compute {within:.0f} "
+               "ended within 10 ms")
+        self.assertEqual(metric(self.server, "binpose_detect_streams"), 0)
+        self.assertEqual(metric(self.server, "binpose_requests_held_bytes"), 0)
+
+
+class KillTest(StressTest):
+    def test_kill_loses_no_acknowledged_model(self):
+        dice = random.Random(2)
+        count = 100 if FULL else 8
+        acknowledged = {"part": self.api.models()[0].content_hash}
+        for round_ in range(count):
+            timer = threading.Timer(dice.uniform(0, 0.3), self.server.kill)
+            timer.start()
+            unsure = None
+            try:
+                while True:
+                    unsure = f"m{dice.randrange(5)}"
+                    if unsure in acknowledged and dice.random() < 0.4:
+                        self.api.delete(unsure)
+                        del acknowledged[unsure]
+                    else:
+                        acknowledged[unsure] = self.api.import_model(unsure, KEPT["model"]).content_hash
+            except grpc.RpcError:
+                pass
+            timer.join()
+            self.server = self.start()
+            self.api = Api(self.server.address)
+            served = {entry.id: entry.content_hash for entry in self.api.models()}
+            self.assertEqual({k: v for k, v in served.items() if k != unsure},
+                             {k: v for k, v in acknowledged.items() if k != unsure}, f"round {round_}")
+            self.assertEqual(metric(self.server, "binpose_model_files_skipped_total"), 0)
+            acknowledged = served
+        figure("kill", f"{count} kills while importing, replacing and deleting: every acknowledged model was there, "
+               "none half-written")
+
+
+class DiskFullTest(unittest.TestCase):
+    def test_a_full_disk_is_told_and_the_old_model_kept(self):
+        with tempfile.TemporaryDirectory() as directory:
+            mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", directory]
+            if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+                self.skipTest("needs the right to mount a small disk")
+            server = Server(directory)
+            try:
+                api = Api(server.address)
+                api.import_model("part", KEPT["model"])
+                with self.assertRaises(grpc.RpcError) as caught:
+                    for number in range(5):
+                        api.import_model(f"more{number}", KEPT["model"])
+                self.assertIn("No space left", caught.exception.details())
+                with self.assertRaises(grpc.RpcError):
+                    api.import_model("part", KEPT["model"])
+                self.assertIn("part", [entry.id for entry in api.models()])
+                figure("disk full", f"{caught.exception.details()!r}, the old model is served")
+            finally:
+                server.kill()
+                subprocess.run(["umount", directory], check=True)
+
+
+class MemoryTest(StressTest):
+    arguments = ["--request-memory-mib", "64"]
+
+    def test_a_huge_message_does_not_fill_the_memory(self):
+        before = metric(self.server, "process_resident_memory_bytes")
+        huge = wire.detection.DetectRequest(cloud=wire.types.PointCloud(pcd=bytes(400 << 20)))
+        most = [before]
+        stop = threading.Event()
+
+        def watch():
+            while not stop.is_set():
+                most.append(self.server.resident_bytes())
+                time.sleep(0.005)
+
+        thread = threading.Thread(target=watch)
+        thread.start()
+        with self.assertRaises(grpc.RpcError) as caught:
+            list(self.api.detect([huge], timeout=60))
+        stop.set()
+        thread.join()
+        growth = (max(most) - before) / 2**20
+        figure("huge message", f"400 MiB at a limit of 64 MiB: RSS grew by {growth:.0f} MiB; {caught.exception.code().name}"
+               f" {caught.exception.details()!r}")
+        self.api = Api(self.server.address)
+        self.assert_serves()
+
+
+class IdleTest(StressTest):
+    def test_idle_streams_cost_no_threads(self):
+        self.assert_serves()
+        before = self.server.thread_count()
+        ends = [threading.Event() for _ in range(200)]
+
+        def requests(end):
+            end.wait()
+            yield from ()
+
+        calls = [self.api.detect(requests(end)) for end in ends]
+        deadline = time.monotonic() + 20
+        while metric(self.server, "binpose_detect_streams") < 200 and time.monotonic() < deadline:
+            time.sleep(0.1)
+        open_ = metric(self.server, "binpose_detect_streams")
+        after = self.server.thread_count()
+        for end in ends:
+            end.set()
+        for call in calls:
+            list(call)
+        figure("idle streams", f"{open_:.0f} open: {before} threads before, {after} then")
+        self.assertEqual(open_, 200)
+        self.assertLessEqual(after, before)
+
+
+class OperationsTest(StressTest):
+    def test_metrics_are_clean(self):
+        self.assert_serves()
+        with urllib.request.urlopen(f"http://{self.server.metrics}/metrics", timeout=30) as page:
+            text = page.read()
+        if not shutil.which("promtool"):
+            self.skipTest("promtool is not installed")
+        run = subprocess.run(["promtool", "check", "metrics"], input=text, capture_output=True)
+        self.assertEqual((run.returncode, run.stdout + run.stderr), (0, b""))
+
+    def test_a_copied_file_is_served_and_a_removed_one_dropped(self):
+        start = time.monotonic()
+        shutil.copy(self.directory / "part.model", self.directory / "copy.model")
+        while "copy" not in [entry.id for entry in self.api.models()] and time.monotonic() < start + 10:
+            time.sleep(0.02)
+        served = time.monotonic() - start
+        start = time.monotonic()
+        (self.directory / "copy.model").unlink()
+        while "copy" in [entry.id for entry in self.api.models()] and time.monotonic() < start + 10:
+            time.sleep(0.02)
+        dropped = time.monotonic() - start
+        figure("directory", f"a copied file is served after {served:.2f} s, a removed one dropped after {dropped:.2f} s")
+        self.assertLess(max(served, dropped), 5)
+
+
+class CostTest(StressTest):
+    def test_what_the_service_adds_to_a_detection(self):
+        width, height = 640, 470  # 300 800 points, most of them a wall: what core does with them is not measured
+        points = bytearray()
+        for row in range(height):
+            for column in range(width):
+                points += struct.pack("<3f", column - 320, row - 235, 1000)
+        request = wire.detection.DetectRequest(
+            model_ids=["part"],
+            cloud=wire.types.PointCloud(unit=wire.types.LENGTH_UNIT_MILLIMETRE, points=wire.types.PackedPoints(
+                width=width, height=height, xyz=bytes(points)))).SerializeToString()
+        costs = []
+        sent = []
+
+        def requests():
+            for _ in range(31):
+                sent.append(time.monotonic())
+                yield request
+                ready.acquire()
+
+        ready = threading.Semaphore(0)
+        for response in self.api.detect_bytes(requests()):
+            self.assertFalse(response.HasField("error"), response.error)
+            costs.append(time.monotonic() - sent[-1] - response.stats.total_seconds)
+            ready.release()
+        figure("cost", f"median {1000 * percentile(costs[1:], 0.5):.1f} ms a frame of 300 800 points outside core, "
+               "Python's share of the transport included")
+
+
+@unittest.skipUnless(BUF.exists(), "buf is not installed")
+class ForeignClientTest(StressTest):
+    def curl(self, method, data):
+        run = subprocess.run([BUF, "curl", "--http2-prior-knowledge", "--protocol", "grpc",
+                              f"http://{self.server.address}/binpose.v1.{method}", "-d", "@-"],
+                             input=data, capture_output=True, text=True, timeout=60)
+        return run.returncode, run.stdout + run.stderr
+
+    def test_a_client_that_is_not_ours_finds_calls_and_streams(self):
+        status, listed = self.curl("ModelService/ListModels", "{}")
+        self.assertEqual(status, 0, listed)
+        self.assertIn('"id": "part"', listed)
+        status, answers = self.curl("DetectionService/Detect", '{"requestId": "a"} {"requestId": "b"}')
+        self.assertEqual(status, 0, answers)
+        self.assertLess(answers.index('"requestId": "a"'), answers.index('"requestId": "b"'))
+        self.assertIn("model_ids has 0 entries", answers)
+        status, error = self.curl("ModelService/GetModel", '{"id": "ghost"}')
+        self.assertNotEqual(status, 0)
+        self.assertIn("not_found", error)
+        figure("foreign client", "buf curl: reflection, unary, stream and errors")
+
+
+class SoakTest(StressTest):
+    @unittest.skipUnless(FULL, "nightly")
+    def test_memory_does_not_grow(self):
+        minutes = float(os.environ.get("BINPOSE_SOAK_MINUTES", "30"))
+        samples = []
+        start = time.monotonic()
+        while (elapsed := time.monotonic() - start) < 60 * minutes:
+            self.assert_serves()
+            if elapsed > 10 * minutes:  # a sixth for warm-up
+                samples.append((elapsed / 3600, self.server.resident_bytes() / 2**20))
+        mean_x = sum(x for x, _ in samples) / len(samples)
+        mean_y = sum(y for _, y in samples) / len(samples)
+        slope = sum((x - mean_x) * (y - mean_y) for x, y in samples) / sum((x - mean_x) ** 2 for x, _ in samples)
+        figure("soak", f"{minutes:.0f} minutes, RSS {mean_y:.0f} MiB, slope {slope:.2f} MiB/h")
+        self.assertLess(slope, 1)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
