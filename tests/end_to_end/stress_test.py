@@ -6,8 +6,10 @@ import math
 import os
 import random
 import shutil
+import signal
 import struct
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -299,6 +301,32 @@ class IdleTest(StressTest):
         figure("idle streams", f"{open_:.0f} open: {before} threads before, {after} then")
         self.assertEqual(open_, 200)
         self.assertLessEqual(after, before)
+
+
+class DeadPeerTest(StressTest):
+    @unittest.skipUnless(FULL, "takes a minute")
+    def test_a_peer_that_falls_silent_is_reaped(self):
+        script = ("import sys, time, wire\n"
+                  "api = wire.Api(sys.argv[1])\n"
+                  "def requests():\n"
+                  "    yield wire.detection.DetectRequest(request_id='1')\n"
+                  "    time.sleep(600)\n"
+                  "for answer in api.detect(requests()): print(answer.request_id, flush=True)\n")
+        peer = subprocess.Popen([sys.executable, "-c", script, self.server.address], cwd=Path(__file__).parent,
+                                stdout=subprocess.PIPE, text=True)
+        try:
+            self.assertEqual(peer.stdout.readline(), "1\n")
+            self.assertEqual(metric(self.server, "binpose_detect_streams"), 1)
+            peer.send_signal(signal.SIGSTOP)  # its socket stays open, but nobody answers
+            start = time.monotonic()
+            while metric(self.server, "binpose_detect_streams") > 0 and time.monotonic() < start + 120:
+                time.sleep(0.5)
+            figure("dead peer", f"reaped after {time.monotonic() - start:.0f} s")
+            self.assertEqual(metric(self.server, "binpose_detect_streams"), 0)
+        finally:
+            peer.kill()
+            peer.wait()
+            peer.stdout.close()
 
 
 class OperationsTest(StressTest):
