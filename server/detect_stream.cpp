@@ -59,7 +59,7 @@ void DetectStream::compute(Frame& frame) {
   const CancelPlace place = control.stop.stop_requested() ? CancelPlace::kQueue : CancelPlace::kCompute;
   grpc::ByteBuffer answer = around_.handler.answer(frame.bytes, frame.arrival, control);
   if (control.stop.stop_requested()) around_.handler.note_cancel(place, seconds_since(cancel_time_));
-  set_answer(frame, std::move(answer));
+  set_answer(frame, answer);
 }
 
 void DetectStream::set_answer(Frame& frame, grpc::ByteBuffer answer) {

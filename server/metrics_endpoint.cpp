@@ -38,7 +38,8 @@ class Page final : public CivetHandler {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::start(const std::string& address, Source source) {
+absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::start(const std::string& address,
+                                                                        const Source& source) {
   // A half-open socket holds a thread until the time-out.
   const std::vector<std::string> options = {"listening_ports",    address, "num_threads", "8",
                                             "request_timeout_ms", "5000"};

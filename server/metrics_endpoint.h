@@ -23,7 +23,7 @@ class MetricsEndpoint {
   };
 
   /// @param address  HOST:PORT, port 0 = a free one. Errors: UNAVAILABLE (the address cannot be had).
-  static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> start(const std::string& address, Source source);
+  static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> start(const std::string& address, const Source& source);
 
   int port() { return server_->getListeningPorts().front(); }
 
