@@ -22,7 +22,7 @@ v1::Error to_error(const absl::Status& status) {
   v1::Error error;
   error.set_code(static_cast<int>(status.code()));
   error.set_message(std::string(status.message()));
-  if (auto retry_info = retry_info_of(status)) *error.mutable_retry_info() = *std::move(retry_info);
+  if (const auto retry_info = retry_info_of(status)) *error.mutable_retry_delay() = retry_info->retry_delay();
   return error;
 }
 

@@ -110,7 +110,7 @@ class OverloadTest(StressTest):
                     good.append(took)
                 else:
                     refused.append(took)
-                    hints.append(response.error.HasField("retry_info"))
+                    hints.append(response.error.HasField("retry_delay"))
                     time.sleep(1 / capacity)  # clients that heed the hint ask about as often as the server answers
 
         with concurrent.futures.ThreadPoolExecutor(8) as pool:

@@ -13,15 +13,9 @@ PART = ROOT / "tests/data/parts/bearing_support.stl"
 SCENE = ROOT / "tests/data/scenes/bearing_support_01"
 
 _generated = tempfile.TemporaryDirectory()
-_protos = [path.relative_to(ROOT / "proto") for path in (ROOT / "proto").rglob("*.proto")]
+_protos = [path.relative_to(ROOT / "proto") for path in (ROOT / "proto/binpose").rglob("*.proto")]
 subprocess.run(["protoc", f"--proto_path={ROOT / 'proto'}", f"--python_out={_generated.name}", *_protos], check=True)
 sys.path.insert(0, _generated.name)
-# `google` and `grpc` are packages already: their generated parts are loaded beside them.
-for _file in ["google/rpc/error_details_pb2", "google/rpc/status_pb2"]:
-    _spec = importlib.util.spec_from_file_location(_file.replace("/", "."), f"{_generated.name}/{_file}.py")
-    sys.modules[_spec.name] = importlib.util.module_from_spec(_spec)
-    _spec.loader.exec_module(sys.modules[_spec.name])
-error_details = sys.modules["google.rpc.error_details_pb2"]
 detection = importlib.import_module("binpose.v1.detection_service_pb2")
 model = importlib.import_module("binpose.v1.model_service_pb2")
 types = importlib.import_module("binpose.v1.types_pb2")
