@@ -60,6 +60,17 @@ absl::StatusOr<v1::Model> Client::get_model(const std::string& id) {
   return model;
 }
 
+absl::StatusOr<v1::GetModelShapeResponse> Client::get_model_shape(const std::string& id) {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::GetModelShapeRequest request;
+  request.set_id(id);
+  v1::GetModelShapeResponse shape;
+  const grpc::Status status = models_->GetModelShape(&context, request, &shape);
+  if (!status.ok()) return call_error(status, {"Reading the shape of model \"" + id + "\"", server_});
+  return shape;
+}
+
 absl::StatusOr<v1::ListModelsResponse> Client::list_models() {
   grpc::ClientContext context;
   set_timeout(timeouts_.call, context);

@@ -38,6 +38,7 @@ class Client {
   absl::StatusOr<v1::Model> train(const v1::TrainRequest& request, const TrainObserver& observer = {});
 
   absl::StatusOr<v1::Model> get_model(const std::string& id);
+  absl::StatusOr<v1::GetModelShapeResponse> get_model_shape(const std::string& id);
   absl::StatusOr<v1::ListModelsResponse> list_models();
   absl::Status delete_model(const std::string& id);
 

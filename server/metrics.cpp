@@ -3,7 +3,7 @@
 namespace binpose::server {
 namespace {
 
-constexpr std::array kMethodNames = {"Train", "GetModel", "ListModels", "DeleteModel", "Detect"};
+constexpr std::array kMethodNames = {"Train", "GetModel", "GetModelShape", "ListModels", "DeleteModel", "Detect"};
 constexpr std::array kStageNames = {"preprocess", "vote", "cluster", "refine", "verify", "rank"};
 
 /// From a fast detection to a slow training, seconds.

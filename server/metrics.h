@@ -14,7 +14,7 @@
 namespace binpose::server {
 
 /// The methods that are measured.
-enum class Method { kTrain, kGetModel, kListModels, kDeleteModel, kDetect };
+enum class Method { kTrain, kGetModel, kGetModelShape, kListModels, kDeleteModel, kDetect };
 
 /// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
 class Metrics {
@@ -32,7 +32,7 @@ class Metrics {
   std::shared_ptr<prometheus::Registry> registry() const { return registry_; }
 
  private:
-  static constexpr int kMethods = 5;
+  static constexpr int kMethods = 6;
   static constexpr int kCodes = 17;
   static constexpr int kStages = 6;
 

@@ -100,6 +100,12 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
     return call_status;
   }
 
+  grpc::Status GetModelShape(grpc::ServerContext* /*context*/, const v1::GetModelShapeRequest* /*request*/,
+                             v1::GetModelShapeResponse* shape) override {
+    shape->set_surface("twelve bytes");
+    return call_status;
+  }
+
   grpc::Status ListModels(grpc::ServerContext* /*context*/, const v1::ListModelsRequest* /*request*/,
                           v1::ListModelsResponse* models) override {
     models->add_models()->set_id("bolt");
