@@ -8,16 +8,14 @@ run="libabsl20220623 libgrpc++1.51 liblzf1 libpng16-16 libprometheus-cpp-core1.0
 build="cmake g++ ninja-build
   libabsl-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
-test="clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev
-  pkgconf python3 shellcheck"
+test="chromium chromium-driver clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev
+  pkgconf python3 python3-selenium shellcheck"
+# Node.js from elsewhere brings its own npm and conflicts with Debian's.
+command -v npm >/dev/null || build="$build npm ca-certificates"
 case "${1:-}" in
   run) packages=$run ;;
   build) packages=$build ;;
-  test)
-    packages="$build $test"
-    # Node.js from elsewhere brings its own npm and conflicts with Debian's.
-    command -v npm >/dev/null || packages="$packages npm ca-certificates"
-    ;;
+  test) packages="$build $test" ;;
   *)
     echo "Usage: $0 run|build|test" >&2
     exit 2

@@ -10,6 +10,7 @@
 #include "client/call_error.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
+#include "client/cli/result_page.h"
 #include "client/cli/scan_options.h"
 #include "client/cli/table.h"
 
@@ -28,6 +29,8 @@ RollPitchYaw roll_pitch_yaw(const v1::Quaternion& q) {
           .pitch = kDegrees * std::asin(std::clamp(sin_pitch, -1.0, 1.0)),
           .yaw = kDegrees * std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()))};
 }
+
+double millimetres_per(v1::LengthUnit unit) { return unit == v1::LENGTH_UNIT_METRE ? 1000 : 1; }
 
 Table table_of(const v1::DetectResponse& answer, double millimetres_per_unit) {
   Table table = {{"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible"}};
@@ -115,14 +118,38 @@ ExitCode exchange(const ScanOptions& options, bool json, DetectStream& stream) {
     if (json) {
       std::cout << answer_json(*answer) << std::endl;
     } else if (error.ok()) {
-      print_answer(*answer, scene, options.unit == v1::LENGTH_UNIT_METRE ? 1000 : 1);
+      print_answer(*answer, scene, millimetres_per(options.unit));
     }
   }
   return exit_code;
 }
 
-ExitCode detect(const ScanOptions& options, const GlobalOptions& global) {
+/// Searches the one scene and draws what was found.
+ExitCode detect_and_draw(const ScanOptions& options, const ResultPageOptions& drawing, bool json, Client& client) {
+  const std::string& scene = options.scenes.front();
+  const absl::StatusOr<v1::DetectRequest> request = make_request(options, scene);
+  if (!request.ok()) {
+    report(request.status());
+    return kUnreadable;
+  }
+  const absl::StatusOr<v1::DetectResponse> answer = client.detect(*request);
+  if (!answer.ok()) return report_call({answer.status().code(), scene + ": " + std::string(answer.status().message())});
+  if (json) {
+    std::cout << answer_json(*answer) << std::endl;
+  } else {
+    print_answer(*answer, scene, millimetres_per(options.unit));
+  }
+  if (absl::Status status = write_result_page(drawing, *request, *answer, client); !status.ok()) {
+    report(status);
+    return kUnreadable;
+  }
+  if (!json) std::cout << "drawn in " << *drawing.page << '\n';
+  return kOk;
+}
+
+ExitCode detect(const ScanOptions& options, const ResultPageOptions& drawing, const GlobalOptions& global) {
   Client client = connect(global);
+  if (drawing.page.has_value()) return detect_and_draw(options, drawing, global.json, client);
   const std::unique_ptr<DetectStream> stream = client.open_detect_stream();
   const ExitCode exit_code = exchange(options, global.json, *stream);
   if (absl::Status status = stream->finish(); !status.ok()) return report_call(status);
@@ -133,12 +160,22 @@ ExitCode detect(const ScanOptions& options, const GlobalOptions& global) {
 
 void add_detect(CLI::App& app, const GlobalOptions& global, Command& chosen) {
   const auto options = std::make_shared<ScanOptions>();
+  const auto drawing = std::make_shared<ResultPageOptions>();
   CLI::App& command = *app.add_subcommand("detect", "Find parts in scenes; all scenes go over one stream, in order");
   command.footer(
       "\nA pose maps the part's CAD frame to the scene's frame: position in mm, R = Rz(yaw) Ry(pitch) Rx(roll) in "
       "degrees.");
   add_scan_options(command, *options);
-  command.callback([&chosen, options, &global] { chosen = [options, &global] { return detect(*options, global); }; });
+  add_result_page_options(command, *drawing);
+  command.callback([&chosen, options, drawing, &global] {
+    if (drawing->page.has_value() && options->scenes.size() > 1) {
+      throw CLI::ValidationError("--view", "draws one scene; " + std::to_string(options->scenes.size()) + " are given");
+    }
+    if (drawing->meshes.size() > options->model_ids.size()) {
+      throw CLI::ValidationError("--mesh", "takes one file for each --model, in the same order");
+    }
+    chosen = [options, drawing, &global] { return detect(*options, *drawing, global); };
+  });
 }
 
 }  // namespace binpose::client::cli
