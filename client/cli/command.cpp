@@ -2,6 +2,8 @@
 
 #include <iostream>
 
+#include "client/cli/style.h"
+
 namespace binpose::client::cli {
 
 Client connect(const GlobalOptions& global) {
@@ -13,7 +15,9 @@ Client connect(const GlobalOptions& global) {
   return Client(global.server, timeouts);
 }
 
-void report(const absl::Status& error) { std::cerr << "binpose: " << error.message() << std::endl; }
+void report(const absl::Status& error) {
+  std::cerr << coloured("binpose: ", Colour::kRed, stderr) << error.message() << std::endl;
+}
 
 ExitCode report_call(const absl::Status& error) {
   report(error);

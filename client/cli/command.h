@@ -36,7 +36,10 @@ void add_detect(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_models(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_model(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_delete(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_bench(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_watch(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_request(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_completion(CLI::App& app, const GlobalOptions& global, Command& chosen);
 
 /// A client for the server that the user named.
 Client connect(const GlobalOptions& global);

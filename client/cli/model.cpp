@@ -46,6 +46,7 @@ ExitCode show_model(const ModelOptions& options, const GlobalOptions& global) {
 void add_model(CLI::App& app, const GlobalOptions& global, Command& chosen) {
   const auto options = std::make_shared<ModelOptions>();
   CLI::App& command = *app.add_subcommand("model", "Show one model");
+  command.footer("\nExamples:\n  binpose model gear\n  binpose model gear --view gear.html");
   command.add_option("id", options->id, "Its ID")->required();
   add_view(command, options->page, "Also draw the model into this HTML file, to be opened in a browser");
   command.callback(
