@@ -27,8 +27,20 @@ Client::Client(std::string server, Timeouts timeouts)
     : server_(std::move(server)),
       timeouts_(timeouts),
       channel_(open_channel(server_)),
+      health_(grpc::health::v1::Health::NewStub(channel_)),
       models_(v1::ModelService::NewStub(channel_)),
       detection_(v1::DetectionService::NewStub(channel_)) {}
+
+absl::Status Client::check_health() {
+  const CallName call{"Asking for health", server_};
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  grpc::health::v1::HealthCheckResponse response;
+  const grpc::Status status = health_->Check(&context, grpc::health::v1::HealthCheckRequest(), &response);
+  if (!status.ok()) return call_error(status, call);
+  if (response.status() == grpc::health::v1::HealthCheckResponse::SERVING) return absl::OkStatus();
+  return absl::UnavailableError("The server at " + server_ + " answers, but takes no calls: it starts or ends.");
+}
 
 absl::StatusOr<v1::Model> Client::train(const v1::TrainRequest& request, const TrainObserver& observer) {
   const CallName call{"Training model \"" + request.id() + "\"", server_};

@@ -13,6 +13,7 @@
 #include "binpose/v1/detection_service.grpc.pb.h"
 #include "binpose/v1/model_service.grpc.pb.h"
 #include "client/detect_stream.h"
+#include "grpc/health/v1/health.grpc.pb.h"
 
 namespace binpose::client {
 
@@ -34,6 +35,9 @@ class Client {
   /// `server`: HOST:PORT, plaintext. Connects with the first call, and again when the connection is lost.
   explicit Client(std::string server, Timeouts timeouts = {});
 
+  /// OK when the server takes calls; UNAVAILABLE when it does not, for example because it is about to end.
+  absl::Status check_health();
+
   /// Trains a model and waits until it is served. `observer` is called on this thread, for every message of progress.
   absl::StatusOr<v1::Model> train(const v1::TrainRequest& request, const TrainObserver& observer = {});
 
@@ -52,6 +56,7 @@ class Client {
   std::string server_;
   Timeouts timeouts_;
   std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<grpc::health::v1::Health::Stub> health_;
   std::unique_ptr<v1::ModelService::Stub> models_;
   std::unique_ptr<v1::DetectionService::Stub> detection_;
 };

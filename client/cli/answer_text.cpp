@@ -50,8 +50,9 @@ void print_answer(const v1::DetectResponse& answer, const std::string& scene, v1
   if (stats.stop_reason() == v1::STOP_REASON_MAX_RESULTS) std::cout << " (the best of more)";
   std::cout << '\n';
   if (count > 0) print(table_of(answer, millimetres_per(unit)), std::cout);
-  for (const std::string& warning : answer.warnings())
+  for (const std::string& warning : answer.warnings()) {
     std::cout << coloured("warning: ", Colour::kYellow, stdout) << warning << '\n';
+  }
   std::cout << std::flush;
 }
 

@@ -38,6 +38,7 @@ void add_model(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_delete(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_bench(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_watch(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_health(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_request(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_completion(CLI::App& app, const GlobalOptions& global, Command& chosen);
 

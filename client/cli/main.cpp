@@ -41,6 +41,7 @@ int run(int argc, char** argv) {
   add_delete(app, global, chosen);
   add_watch(app, global, chosen);
   add_bench(app, global, chosen);
+  add_health(app, global, chosen);
   add_request(app, global, chosen);
   add_completion(app, global, chosen);
   try {

@@ -269,6 +269,15 @@ TEST_F(Cli, ATerminalGetsColoursUnlessTheUserWantsNone) {
   EXPECT_THAT(files_.read("plain"), AllOf(HasSubstr("binpose: "), Not(HasSubstr("\033[31m"))));
 }
 
+TEST_F(Cli, HealthTellsByItsExitCodeWhetherTheServerServes) {
+  EXPECT_EQ(run("health").out, "serving\n");
+  EXPECT_EQ(run("health --server 127.0.0.1:1").exit_code, 4);
+  server_.set_serving(false);
+  const Output output = run("health");
+  EXPECT_EQ(output.exit_code, 4);
+  EXPECT_THAT(output.err, HasSubstr("takes no calls"));
+}
+
 TEST_F(Cli, BenchPrintsPercentiles) {
   server_.answer = one_part;
   const Output output =
