@@ -94,6 +94,7 @@ class StreamLoad {
 LoadReport run_load(const LoadPlan& plan, Client& client) {
   const Clock::time_point start = Clock::now();
   std::vector<std::unique_ptr<StreamLoad>> loads;
+  loads.reserve(static_cast<std::size_t>(plan.streams));
   for (int s = 0; s < plan.streams; ++s) {
     loads.push_back(std::make_unique<StreamLoad>(plan, static_cast<std::uint64_t>(s), start, client));
   }

@@ -55,7 +55,7 @@ class Searcher {
   }
 
  private:
-  void show(const v1::DetectResponse& answer, const std::string& file) {
+  void show(const v1::DetectResponse& answer, const std::string& file) const {
     const absl::Status error = frame_error(answer);
     if (!error.ok()) report({error.code(), file + ": " + std::string(error.message())});
     if (json_) {
