@@ -20,7 +20,7 @@ build_tool() {
 }
 
 finish() {
-  [ -z "$server" ] || kill "$server" 2>/dev/null || true
+  [ -z "$server" ] || { kill "$server" && wait "$server"; } || true
   for mount in "$root/models" "$root/proc" "$root"; do
     mountpoint -q "$mount" && umount "$mount"
   done
@@ -58,24 +58,25 @@ cp tests/data/parts/bearing_support.stl "$work/models/part.stl"
 cp -r tests/data/scenes/bearing_support_01 "$work/models/scene"
 chown -R 10001 "$work/models"
 
-# inside COMMAND...: in the image, as the image's user.
-inside() { chroot --userspec=binpose "$root" env -i PATH=/usr/local/bin:/usr/bin:/bin "$@"; }
-if inside touch /usr/local/written 2>/dev/null; then
+# Runs a command in the image, as the image's user. No function: in the background it would be a shell's child.
+inside="chroot --userspec=binpose $root env -i PATH=/usr/local/bin:/usr/bin:/bin"
+if $inside touch /usr/local/written 2>/dev/null; then
   echo "the root file system can be written" >&2
   exit 1
 fi
 mkfifo "$work/stdout" 2>/dev/null || true
-inside binpose-server --listen 127.0.0.1:0 --metrics 127.0.0.1:0 --model-dir /models >"$work/stdout" 2>"$work/server.log" &
+$inside binpose-server --listen 127.0.0.1:0 --metrics 127.0.0.1:0 --model-dir /models \
+  >"$work/stdout" 2>"$work/binpose-server.log" &
 server=$!
 exec 3<"$work/stdout"
-read -r addresses <&3 || { cat "$work/server.log"; exit 1; }
+read -r addresses <&3 || { cat "$work/binpose-server.log"; exit 1; }
 echo "$addresses"
 address=${addresses#listening on }
 address=${address%%,*}
 
-inside binpose --server "$address" health
-inside binpose --server "$address" train --id part --mesh /models/part.stl --unit mm | head -1
-inside binpose --server "$address" detect --model part --scene /models/scene --unit mm | tee "$work/detect.log" | head -3
+$inside binpose --server "$address" health
+$inside binpose --server "$address" train --id part --mesh /models/part.stl --unit mm | head -1
+$inside binpose --server "$address" detect --model part --scene /models/scene --unit mm | tee "$work/detect.log" | head -3
 grep -q " found in " "$work/detect.log"
 if grep -q "nothing found" "$work/detect.log"; then exit 1; fi
 
