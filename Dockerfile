@@ -1,19 +1,33 @@
-# docker build -t binpose . && docker run -p 50051:50051 -v binpose-models:/models binpose
+# docker build -t binpose .                       the server
+# docker build -t binpose-cli --target cli .      the command
+# Run it as deploy/compose.yaml does: read-only, without privileges, with a volume for the models.
 FROM debian:bookworm-slim AS build
 WORKDIR /src
 COPY deploy/install-packages.sh deploy/
 RUN deploy/install-packages.sh build
 COPY . .
-RUN cmake --preset release && cmake --build --preset release
+RUN cmake --preset release && cmake --build --preset release \
+  && strip build/release/bin/binpose build/release/bin/binpose-server
 
-FROM debian:bookworm-slim
+FROM debian:bookworm-slim AS runtime
 COPY deploy/install-packages.sh /tmp/
-RUN /tmp/install-packages.sh run && rm -rf /tmp/install-packages.sh /var/lib/apt/lists/* \
-  && useradd --system --no-create-home binpose && install -d -o binpose /models
-COPY --from=build /src/build/release/bin/binpose-server /src/build/release/bin/binpose /usr/local/bin/
+RUN /tmp/install-packages.sh run && rm -rf /tmp/install-packages.sh /var/lib/apt/lists/* /var/cache/apt/* \
+  && useradd --system --no-create-home --uid 10001 binpose && install -d -o binpose /models
+# For HEALTHCHECK, and for whoever looks into a container.
+COPY --from=build /src/build/release/bin/binpose /usr/local/bin/
+LABEL org.opencontainers.image.title="binpose" \
+  org.opencontainers.image.description="Finds known parts in point clouds" \
+  org.opencontainers.image.licenses="Apache-2.0"
 USER binpose
+
+FROM runtime AS cli
+ENTRYPOINT ["binpose"]
+
+FROM runtime AS server
+COPY --from=build /src/build/release/bin/binpose-server /usr/local/bin/
 VOLUME /models
 EXPOSE 50051 9464
 STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=10s --timeout=3s --start-period=60s CMD ["binpose", "health", "--timeout", "2"]
 # A container's network is closed unless its ports are published: publish to loopback, or mount --tls-cert and --tls-key.
 ENTRYPOINT ["binpose-server", "--listen", "0.0.0.0:50051", "--insecure", "--metrics", "0.0.0.0:9464", "--model-dir", "/models"]

@@ -68,8 +68,20 @@ Client::Client(const Connection& connection, Timeouts timeouts)
     : server_(connection.server),
       timeouts_(timeouts),
       channel_(open_channel(connection)),
+      health_(grpc::health::v1::Health::NewStub(channel_)),
       models_(v1::ModelService::NewStub(channel_)),
       detection_(v1::DetectionService::NewStub(channel_)) {}
+
+absl::Status Client::check_health() {
+  const CallName call{"Asking for health", server_};
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  grpc::health::v1::HealthCheckResponse response;
+  const grpc::Status status = health_->Check(&context, grpc::health::v1::HealthCheckRequest(), &response);
+  if (!status.ok()) return call_error(status, call);
+  if (response.status() == grpc::health::v1::HealthCheckResponse::SERVING) return absl::OkStatus();
+  return absl::UnavailableError("The server at " + server_ + " answers, but takes no calls: it starts or ends.");
+}
 
 absl::StatusOr<v1::Model> Client::train(const v1::TrainRequest& request, const TrainObserver& observer) {
   const CallName call{"Training model \"" + request.id() + "\"", server_};
@@ -99,6 +111,17 @@ absl::StatusOr<v1::Model> Client::get_model(const std::string& id) {
   const grpc::Status status = models_->GetModel(&context, request, &model);
   if (!status.ok()) return call_error(status, {"Reading model \"" + id + "\"", server_});
   return model;
+}
+
+absl::StatusOr<v1::GetModelShapeResponse> Client::get_model_shape(const std::string& id) {
+  grpc::ClientContext context;
+  set_timeout(timeouts_.call, context);
+  v1::GetModelShapeRequest request;
+  request.set_id(id);
+  v1::GetModelShapeResponse shape;
+  const grpc::Status status = models_->GetModelShape(&context, request, &shape);
+  if (!status.ok()) return call_error(status, {"Reading the shape of model \"" + id + "\"", server_});
+  return shape;
 }
 
 absl::StatusOr<v1::ListModelsResponse> Client::list_models() {

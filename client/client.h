@@ -13,6 +13,7 @@
 #include "binpose/v1/detection_service.grpc.pb.h"
 #include "binpose/v1/model_service.grpc.pb.h"
 #include "client/detect_stream.h"
+#include "grpc/health/v1/health.grpc.pb.h"
 
 namespace binpose::client {
 
@@ -45,10 +46,14 @@ class Client {
   /// `server`: HOST:PORT, plaintext.
   explicit Client(const std::string& server, Timeouts timeouts = {}) : Client(Connection{.server = server}, timeouts) {}
 
+  /// OK when the server takes calls; UNAVAILABLE when it does not, for example because it is about to end.
+  absl::Status check_health();
+
   /// Trains a model and waits until it is served. `observer` is called on this thread, for every message of progress.
   absl::StatusOr<v1::Model> train(const v1::TrainRequest& request, const TrainObserver& observer = {});
 
   absl::StatusOr<v1::Model> get_model(const std::string& id);
+  absl::StatusOr<v1::GetModelShapeResponse> get_model_shape(const std::string& id);
   absl::StatusOr<v1::ListModelsResponse> list_models();
   absl::Status delete_model(const std::string& id);
   /// The bytes of a model, for import_model() of another server.
@@ -65,6 +70,7 @@ class Client {
   std::string server_;
   Timeouts timeouts_;
   std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<grpc::health::v1::Health::Stub> health_;
   std::unique_ptr<v1::ModelService::Stub> models_;
   std::unique_ptr<v1::DetectionService::Stub> detection_;
 };

@@ -1,5 +1,5 @@
 #!/bin/sh
-# From a fresh Debian 12 to ranked poses: installs what is missing, builds, starts a server on a free port, trains the
+# From a fresh Debian 12 to ranked poses and a picture of them: installs what is missing, builds, starts a server on a free port, trains the
 # sample part, detects it in the sample scan and stops the server. Leaves nothing behind but packages and build/.
 set -eu
 cd "$(dirname "$0")/.."
@@ -46,7 +46,12 @@ heading "Train $part"
 "$bin/binpose" train --id $part --mesh tests/data/parts/$part.stl --unit mm
 
 heading "Detect"
-"$bin/binpose" detect --model $part --scene tests/data/scenes/${part}_01 --unit mm
+scene=tests/data/scenes/${part}_01
+set -- --model $part --scene "$scene" --unit mm
+if [ -s build/release/client/viewer/page.html ]; then
+  set -- "$@" --view build/quickstart.html --mesh tests/data/parts/$part.stl --mesh-unit mm --truth "$scene/gt.json"
+fi
+"$bin/binpose" detect "$@"
 
 heading "Stop"
 kill "$server"

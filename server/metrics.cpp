@@ -5,8 +5,8 @@
 namespace binpose::server {
 namespace {
 
-constexpr std::array kMethodNames = {"Train",       "GetModel",    "ListModels", "DeleteModel",
-                                     "ExportModel", "ImportModel", "Detect"};
+constexpr std::array kMethodNames = {"Train",       "GetModel",    "GetModelShape", "ListModels",
+                                     "DeleteModel", "ExportModel", "ImportModel",   "Detect"};
 constexpr std::array kRefusalNames = {"queue_full", "deadline", "memory"};
 constexpr std::array kStageNames = {"preprocess", "vote", "cluster", "refine", "verify", "rank"};
 

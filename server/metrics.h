@@ -15,7 +15,16 @@
 namespace binpose::server {
 
 /// The methods that are measured.
-enum class Method { kTrain, kGetModel, kListModels, kDeleteModel, kExportModel, kImportModel, kDetect };
+enum class Method {
+  kTrain,
+  kGetModel,
+  kGetModelShape,
+  kListModels,
+  kDeleteModel,
+  kExportModel,
+  kImportModel,
+  kDetect
+};
 
 /// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
 class Metrics {
@@ -42,7 +51,7 @@ class Metrics {
   std::shared_ptr<prometheus::Registry> registry() const { return registry_; }
 
  private:
-  static constexpr int kMethods = 7;
+  static constexpr int kMethods = 8;
   static constexpr int kCodes = 17;
   static constexpr int kStages = 6;
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/clock.h"
+#include "server/convert_shape.h"
 #include "server/convert_training.h"
 #include "server/log.h"
 #include "server/model_transfer.h"
@@ -27,6 +28,14 @@ absl::Status get_model(const ModelStore& models, const std::string& id, v1::Mode
   const auto stored = models.find(id);
   if (!stored.ok()) return stored.status();
   response = to_proto(**stored);
+  return absl::OkStatus();
+}
+
+absl::Status get_model_shape(const ModelStore& models, const std::string& id, v1::GetModelShapeResponse& response) {
+  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
+  const auto stored = models.find(id);
+  if (!stored.ok()) return stored.status();
+  response = shape_of((*stored)->model);
   return absl::OkStatus();
 }
 
@@ -62,6 +71,16 @@ grpc::ServerUnaryReactor* ModelService::GetModel(grpc::CallbackServerContext* co
   absl::Status status = backend_.tokens.check(*context, Role::kDetect);
   if (status.ok()) status = get_model(backend_.models, request->id(), *response);
   finish(reactor, backend_.metrics, Method::kGetModel, arrival, status);
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* ModelService::GetModelShape(grpc::CallbackServerContext* context,
+                                                      const v1::GetModelShapeRequest* request,
+                                                      v1::GetModelShapeResponse* response) {
+  const Clock::time_point arrival = Clock::now();
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  finish(reactor, backend_.metrics, Method::kGetModelShape, arrival,
+         get_model_shape(backend_.models, request->id(), *response));
   return reactor;
 }
 

@@ -14,6 +14,8 @@ class ModelService final : public v1::ModelService::CallbackService {
                                                      const v1::TrainRequest* request) override;
   grpc::ServerUnaryReactor* GetModel(grpc::CallbackServerContext* context, const v1::GetModelRequest* request,
                                      v1::Model* response) override;
+  grpc::ServerUnaryReactor* GetModelShape(grpc::CallbackServerContext* context, const v1::GetModelShapeRequest* request,
+                                          v1::GetModelShapeResponse* response) override;
   grpc::ServerUnaryReactor* ListModels(grpc::CallbackServerContext* context, const v1::ListModelsRequest* request,
                                        v1::ListModelsResponse* response) override;
   grpc::ServerWriteReactor<v1::ExportModelResponse>* ExportModel(grpc::CallbackServerContext* context,

@@ -26,11 +26,14 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, Value& chose
       ->type_name(words);
 }
 
+/// The units by the words that stand for them.
+inline std::map<std::string, v1::LengthUnit> length_units() {
+  return {{"mm", v1::LENGTH_UNIT_MILLIMETRE}, {"m", v1::LENGTH_UNIT_METRE}};
+}
+
 /// Adds the required option --unit.
 inline void add_unit(CLI::App& command, v1::LengthUnit& unit, const std::string& help) {
-  add_choice<v1::LengthUnit>(command, "--unit", unit,
-                             {{"mm", v1::LENGTH_UNIT_MILLIMETRE}, {"m", v1::LENGTH_UNIT_METRE}}, help)
-      ->required();
+  add_choice<v1::LengthUnit>(command, "--unit", unit, length_units(), help)->required();
 }
 
 }  // namespace binpose::client::cli

@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "client/cli/style.h"
 #include "client/read_file.h"
 
 namespace binpose::client::cli {
@@ -35,7 +36,9 @@ Client connect(const GlobalOptions& global) {
                 timeouts);
 }
 
-void report(const absl::Status& error) { std::cerr << "binpose: " << error.message() << std::endl; }
+void report(const absl::Status& error) {
+  std::cerr << coloured("binpose: ", Colour::kRed, stderr) << error.message() << std::endl;
+}
 
 ExitCode report_call(const absl::Status& error) {
   report(error);

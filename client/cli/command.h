@@ -42,7 +42,11 @@ void add_model(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_delete(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_export(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_import(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_bench(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_watch(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_health(CLI::App& app, const GlobalOptions& global, Command& chosen);
 void add_request(CLI::App& app, const GlobalOptions& global, Command& chosen);
+void add_completion(CLI::App& app, const GlobalOptions& global, Command& chosen);
 
 /// A client for the server that the user named. Throws CLI::RuntimeError when a file of certificates or the token
 /// cannot be read.

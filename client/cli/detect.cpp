@@ -1,59 +1,20 @@
-#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <future>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <thread>
 
 #include "client/call_error.h"
+#include "client/cli/answer_text.h"
 #include "client/cli/command.h"
 #include "client/cli/json.h"
+#include "client/cli/progress.h"
+#include "client/cli/result_page.h"
 #include "client/cli/scan_options.h"
-#include "client/cli/table.h"
+#include "client/cli/style.h"
 
 namespace binpose::client::cli {
 namespace {
-
-struct RollPitchYaw {
-  double roll = 0, pitch = 0, yaw = 0;  ///< degrees
-};
-
-/// R = Rz(yaw) Ry(pitch) Rx(roll).
-RollPitchYaw roll_pitch_yaw(const v1::Quaternion& q) {
-  constexpr double kDegrees = 180 / std::numbers::pi;
-  const double sin_pitch = 2 * (q.w() * q.y() - q.z() * q.x());
-  return {.roll = kDegrees * std::atan2(2 * (q.w() * q.x() + q.y() * q.z()), 1 - 2 * (q.x() * q.x() + q.y() * q.y())),
-          .pitch = kDegrees * std::asin(std::clamp(sin_pitch, -1.0, 1.0)),
-          .yaw = kDegrees * std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()))};
-}
-
-Table table_of(const v1::DetectResponse& answer, double millimetres_per_unit) {
-  Table table = {{"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible"}};
-  for (const v1::PoseHypothesis& part : answer.hypotheses()) {
-    const v1::Vector3& position = part.pose().position();
-    const RollPitchYaw angles = roll_pitch_yaw(part.pose().orientation());
-    table.push_back({std::to_string(table.size()), part.model_id(), fixed(position.x() * millimetres_per_unit, 2),
-                     fixed(position.y() * millimetres_per_unit, 2), fixed(position.z() * millimetres_per_unit, 2),
-                     fixed(angles.roll, 1), fixed(angles.pitch, 1), fixed(angles.yaw, 1), fixed(part.score(), 3),
-                     fixed(part.visible_fraction(), 2)});
-  }
-  return table;
-}
-
-void print_answer(const v1::DetectResponse& answer, const std::string& scene, double millimetres_per_unit) {
-  const v1::DetectStats& stats = answer.stats();
-  const int count = answer.hypotheses_size();
-  std::cout << scene << ": " << (count == 0 ? "nothing" : std::to_string(count)) << " found in "
-            << fixed(1000 * stats.total_seconds(), 1) << " ms";
-  if (stats.stop_reason() == v1::STOP_REASON_DEADLINE) std::cout << " (stopped early by the deadline)";
-  if (stats.stop_reason() == v1::STOP_REASON_MAX_RESULTS) std::cout << " (the best of more)";
-  std::cout << '\n';
-  if (count > 0) print(table_of(answer, millimetres_per_unit), std::cout);
-  for (const std::string& warning : answer.warnings()) std::cout << "warning: " << warning << '\n';
-  std::cout << std::flush;
-}
 
 /// Writes the scenes to the stream in a thread of its own, and tells of each in turn whether it could be read.
 class SceneWriter {
@@ -104,6 +65,8 @@ ExitCode exchange(const ScanOptions& options, bool json, DetectStream& stream) {
     report({error.code(), scene + ": " + std::string(error.message())});
     if (exit_code == kOk) exit_code = code;
   };
+  // Answers on a terminal are progress enough.
+  const bool has_bar = options.scenes.size() > 1 && is_terminal(stderr) && !is_terminal(stdout);
   SceneWriter writer(options, stream);
   for (std::size_t i = 0; i < options.scenes.size(); ++i) {
     const std::string& scene = options.scenes[i];
@@ -115,14 +78,40 @@ ExitCode exchange(const ScanOptions& options, bool json, DetectStream& stream) {
     if (json) {
       std::cout << answer_json(*answer) << std::endl;
     } else if (error.ok()) {
-      print_answer(*answer, scene, options.unit == v1::LENGTH_UNIT_METRE ? 1000 : 1);
+      print_answer(*answer, scene, options.unit);
     }
+    if (has_bar) draw_progress(static_cast<double>(i + 1) / static_cast<double>(options.scenes.size()), scene);
   }
+  if (has_bar) clear_progress();
   return exit_code;
 }
 
-ExitCode detect(const ScanOptions& options, const GlobalOptions& global) {
+/// Searches the one scene and draws what was found.
+ExitCode detect_and_draw(const ScanOptions& options, const ResultPageOptions& drawing, bool json, Client& client) {
+  const std::string& scene = options.scenes.front();
+  const absl::StatusOr<v1::DetectRequest> request = make_request(options, scene);
+  if (!request.ok()) {
+    report(request.status());
+    return kUnreadable;
+  }
+  const absl::StatusOr<v1::DetectResponse> answer = client.detect(*request);
+  if (!answer.ok()) return report_call({answer.status().code(), scene + ": " + std::string(answer.status().message())});
+  if (json) {
+    std::cout << answer_json(*answer) << std::endl;
+  } else {
+    print_answer(*answer, scene, options.unit);
+  }
+  if (absl::Status status = write_result_page(drawing, *request, *answer, client); !status.ok()) {
+    report(status);
+    return kUnreadable;
+  }
+  if (!json) std::cout << "drawn in " << *drawing.page << '\n';
+  return kOk;
+}
+
+ExitCode detect(const ScanOptions& options, const ResultPageOptions& drawing, const GlobalOptions& global) {
   Client client = connect(global);
+  if (drawing.page.has_value()) return detect_and_draw(options, drawing, global.json, client);
   const std::unique_ptr<DetectStream> stream = client.open_detect_stream();
   const ExitCode exit_code = exchange(options, global.json, *stream);
   if (absl::Status status = stream->finish(); !status.ok()) return report_call(status);
@@ -133,12 +122,27 @@ ExitCode detect(const ScanOptions& options, const GlobalOptions& global) {
 
 void add_detect(CLI::App& app, const GlobalOptions& global, Command& chosen) {
   const auto options = std::make_shared<ScanOptions>();
+  const auto drawing = std::make_shared<ResultPageOptions>();
   CLI::App& command = *app.add_subcommand("detect", "Find parts in scenes; all scenes go over one stream, in order");
   command.footer(
       "\nA pose maps the part's CAD frame to the scene's frame: position in mm, R = Rz(yaw) Ry(pitch) Rx(roll) in "
-      "degrees.");
+      "degrees.\n\n"
+      "Examples:\n"
+      "  binpose detect --model gear --scene bin.ply --unit mm\n"
+      "  binpose detect --model gear --scene depth.png --camera camera.json --unit mm\n"
+      "  binpose detect --model gear --scene bin.ply --unit mm --view result.html --mesh gear.stl --mesh-unit mm\n"
+      "  binpose detect --model gear bolt --scene scan_*/ --unit mm --json | jq .hypotheses[0].pose");
   add_scan_options(command, *options);
-  command.callback([&chosen, options, &global] { chosen = [options, &global] { return detect(*options, global); }; });
+  add_result_page_options(command, *drawing);
+  command.callback([&chosen, options, drawing, &global] {
+    if (drawing->page.has_value() && options->scenes.size() > 1) {
+      throw CLI::ValidationError("--view", "draws one scene; " + std::to_string(options->scenes.size()) + " are given");
+    }
+    if (drawing->meshes.size() > options->model_ids.size()) {
+      throw CLI::ValidationError("--mesh", "takes one file for each --model, in the same order");
+    }
+    chosen = [options, drawing, &global] { return detect(*options, *drawing, global); };
+  });
 }
 
 }  // namespace binpose::client::cli

@@ -9,9 +9,13 @@ constexpr const char* kFooter = R"(
 Examples:
   binpose train --id gear --mesh gear.stl --unit mm
   binpose detect --model gear --scene bin.ply --unit mm
+  binpose detect --model gear --scene bin.ply --unit mm --view result.html
   binpose detect --model gear bolt --scene scan_1/ scan_2/ --unit mm --json
+  binpose watch --model gear --dir scans/ --unit mm
   binpose request --model gear --scene bin.pcd --unit m | grpcurl -plaintext -d @ localhost:50051 \
       binpose.v1.DetectionService/Detect
+
+`binpose COMMAND --help` has the examples of a command.
 
 Exit codes: 0 done; 1 refused by the server, or a scene failed; 2 wrong usage; 3 a file cannot be read;
 4 no server, or no answer in time.)";
@@ -42,7 +46,11 @@ int run(int argc, char** argv) {
   add_delete(app, global, chosen);
   add_export(app, global, chosen);
   add_import(app, global, chosen);
+  add_watch(app, global, chosen);
+  add_bench(app, global, chosen);
+  add_health(app, global, chosen);
   add_request(app, global, chosen);
+  add_completion(app, global, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -27,6 +27,10 @@ ExitCode print_requests(const ScanOptions& options) {
 void add_request(CLI::App& app, const GlobalOptions& /*global*/, Command& chosen) {
   const auto options = std::make_shared<ScanOptions>();
   CLI::App& command = *app.add_subcommand("request", "Print what `detect` would send, as JSON for `grpcurl -d @`");
+  command.footer(
+      "\nExamples:\n"
+      "  binpose request --model gear --scene bin.ply --unit mm | grpcurl -plaintext -d @ localhost:50051 \\\n"
+      "      binpose.v1.DetectionService/Detect");
   add_scan_options(command, *options);
   command.callback([&chosen, options] { chosen = [options] { return print_requests(*options); }; });
 }

@@ -6,12 +6,16 @@
 namespace binpose::client::cli {
 
 void add_scan_options(CLI::App& command, ScanOptions& options) {
-  command.add_option("--model", options.model_ids, "IDs of the parts to look for")->required()->type_name("ID...");
   command
       .add_option("--scene", options.scenes,
                   "PLY or PCD file, depth image (with --camera), or a folder with camera.json and its depth image")
       ->required()
       ->type_name("FILE...");
+  add_search_options(command, options);
+}
+
+void add_search_options(CLI::App& command, ScanOptions& options) {
+  command.add_option("--model", options.model_ids, "IDs of the parts to look for")->required()->type_name("ID...");
   add_unit(command, options.unit, "Unit of the scene's lengths (of a depth image: of the answer's)");
   command.add_option("--camera", options.camera, "Camera file of depth images, JSON")->type_name("FILE");
   command.add_option("--max-results", options.max_results, "At most this many poses, best first");

@@ -24,6 +24,10 @@ struct ScanOptions {
   bool keep_support_plane = false;
 };
 
+/// The options of every search but --scene.
+void add_search_options(CLI::App& command, ScanOptions& options);
+
+/// Those, and --scene.
 void add_scan_options(CLI::App& command, ScanOptions& options);
 
 /// Reads a scene and makes the request for it; its request_id is the end of the scene's name.

@@ -1,6 +1,3 @@
-#include <unistd.h>
-
-#include <algorithm>
 #include <cstdint>
 #include <iostream>
 #include <memory>
@@ -10,6 +7,8 @@
 #include "client/cli/command.h"
 #include "client/cli/json.h"
 #include "client/cli/model_text.h"
+#include "client/cli/progress.h"
+#include "client/cli/style.h"
 #include "client/cli/table.h"
 #include "client/read_file.h"
 
@@ -98,16 +97,9 @@ const char* text_of(v1::TrainStage stage) {
   }
 }
 
-/// Draws the bar over the last one; on its end, clears the line.
-void draw_progress(const v1::TrainResponse& progress) {
-  constexpr int kWidth = 30;
-  const int filled = std::clamp(static_cast<int>(progress.progress() * kWidth), 0, kWidth);
-  std::cerr << "\r\033[K";
-  if (!progress.has_model()) {
-    std::cerr << '[' << std::string(filled, '#') << std::string(kWidth - filled, '.') << "] "
-              << static_cast<int>(100 * progress.progress()) << " % " << text_of(progress.stage());
-  }
-  std::cerr << std::flush;
+void show_progress(const v1::TrainResponse& progress) {
+  if (progress.has_model()) return clear_progress();
+  draw_progress(progress.progress(), text_of(progress.stage()));
 }
 
 ExitCode train(const TrainOptions& options, const GlobalOptions& global) {
@@ -116,11 +108,11 @@ ExitCode train(const TrainOptions& options, const GlobalOptions& global) {
     report(mesh.status());
     return kUnreadable;
   }
-  const bool has_bar = isatty(STDERR_FILENO) != 0;
+  const bool has_bar = is_terminal(stderr);
   const auto begin = std::chrono::steady_clock::now();
   Client client = connect(global);
   const absl::StatusOr<v1::Model> model =
-      client.train(make_request(options, *std::move(mesh)), has_bar ? TrainObserver(draw_progress) : TrainObserver());
+      client.train(make_request(options, *std::move(mesh)), has_bar ? TrainObserver(show_progress) : TrainObserver());
   if (!model.ok()) {
     if (has_bar) std::cerr << '\n';
     return report_call(model.status());
@@ -140,6 +132,12 @@ ExitCode train(const TrainOptions& options, const GlobalOptions& global) {
 void add_train(CLI::App& app, const GlobalOptions& global, Command& chosen) {
   const auto options = std::make_shared<TrainOptions>();
   CLI::App& command = *app.add_subcommand("train", "Make a model of a part from its CAD mesh");
+  command.footer(R"(
+A model of the same ID is replaced, once the new one is saved.
+
+Examples:
+  binpose train --id gear --mesh gear.stl --unit mm
+  binpose train --id gear --mesh gear.stl --unit mm --preset paper --selection observability)");
   add_options(command, *options);
   command.callback([&chosen, options, &global] { chosen = [options, &global] { return train(*options, global); }; });
 }

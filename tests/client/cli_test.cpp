@@ -1,10 +1,13 @@
 #include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -246,6 +249,104 @@ TEST_F(Cli, ModelsListsShowsAndDeletes) {
   EXPECT_THAT(run("model gear").out, AllOf(HasSubstr("gear"), HasSubstr("100.0 mm")));
   EXPECT_EQ(run("delete gear").out, "deleted gear\n");
   EXPECT_THAT(run("models --json").out, HasSubstr("\"id\":\"gear\""));
+}
+
+TEST_F(Cli, EveryCommandTeachesByExamples) {
+  for (const char* command : {"train", "detect", "model", "watch", "bench", "request", "completion"}) {
+    EXPECT_THAT(run(std::string(command) + " --help").out, HasSubstr("Examples:\n  ")) << command;
+  }
+}
+
+TEST_F(Cli, WhatIsNotATerminalGetsNoColours) {
+  EXPECT_THAT(run("--server 127.0.0.1:1 models").err, Not(HasSubstr("\033")));
+}
+
+TEST_F(Cli, ATerminalGetsColoursUnlessTheUserWantsNone) {
+  const std::string command = "script -qec '" + std::string(BINPOSE_COMMAND) + " --server 127.0.0.1:1 models' ";
+  EXPECT_EQ(std::system((command + path("typed")).c_str()) == 0, false);  // NOLINT(cert-env33-c)
+  EXPECT_THAT(files_.read("typed"), HasSubstr("\033[31mbinpose: \033[0m"));
+  EXPECT_NE(std::system(("NO_COLOR=1 " + command + path("plain")).c_str()), 0);  // NOLINT(cert-env33-c)
+  EXPECT_THAT(files_.read("plain"), AllOf(HasSubstr("binpose: "), Not(HasSubstr("\033[31m"))));
+}
+
+TEST_F(Cli, HealthTellsByItsExitCodeWhetherTheServerServes) {
+  EXPECT_EQ(run("health").out, "serving\n");
+  EXPECT_EQ(run("health --server 127.0.0.1:1").exit_code, 4);
+  server_.set_serving(false);
+  const Output output = run("health");
+  EXPECT_EQ(output.exit_code, 4);
+  EXPECT_THAT(output.err, HasSubstr("takes no calls"));
+}
+
+TEST_F(Cli, BenchPrintsPercentiles) {
+  server_.answer = one_part;
+  const Output output =
+      run("bench --model gear --unit mm --rate 50 --streams 2 --duration 0.1 --scene", {file("a.pcd", "# a")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_THAT(output.out, AllOf(HasSubstr("5 of 5 scans answered"), HasSubstr("p99 ms"), HasSubstr("due to answer"),
+                                HasSubstr("23.5")));
+}
+
+TEST_F(Cli, BenchAsJsonPrintsOneObject) {
+  server_.answer = one_part;
+  const Output output =
+      run("bench --json --model gear --unit mm --rate 50 --duration 0.1 --scene", {file("a.pcd", "# a")});
+  google::protobuf::Struct report;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(output.out, &report).ok()) << output.out;
+  EXPECT_EQ(report.fields().at("answered").number_value(), 5);
+  EXPECT_EQ(report.fields().at("totalSeconds").struct_value().fields().at("p50").number_value(), 0.0235);
+}
+
+TEST_F(Cli, BenchPutsNoLoadOnAServerThatRefusesTheScan) {
+  server_.answer = refuse_bad;
+  const Output output = run("bench --model gear --unit mm --rate 50 --scene", {file("a.pcd", "# bad")});
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_THAT(output.err, HasSubstr("The cloud is bad."));
+  EXPECT_EQ(server_.detect_requests().size(), 1U);
+}
+
+TEST_F(Cli, WatchSearchesTheScansOfAFolderInTheOrderOfTheirTimes) {
+  server_.answer = refuse_bad;
+  file("first.pcd", "# first");
+  file("second.pcd", "# bad");
+  std::filesystem::last_write_time(path("first.pcd"),
+                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  const Output output =
+      run("watch --json --model gear --unit mm --existing --count 2 --interval 0.01 --dir", {files_.path().string()});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  const std::vector<v1::DetectResponse> answers = parse_lines(output.out);
+  ASSERT_EQ(answers.size(), 2U);
+  EXPECT_EQ(answers[0].request_id(), path("first.pcd"));
+  EXPECT_TRUE(answers[1].has_error());
+  EXPECT_THAT(output.err, HasSubstr("The cloud is bad."));
+}
+
+TEST_F(Cli, WatchWaitsForAServerAndTriesAgain) {
+  file("scan.pcd", "# scan");
+  const std::string command = "timeout 2 " + std::string(BINPOSE_COMMAND) +
+                              " watch --server 127.0.0.1:1 --model gear --unit mm --existing --interval 0.01 --dir " +
+                              files_.path().string() + " 2>" + path("complaint");
+  EXPECT_EQ(std::system(command.c_str()), 124 << 8);  // NOLINT(cert-env33-c): it was still waiting
+  EXPECT_THAT(files_.read("complaint"), HasSubstr("127.0.0.1:1"));
+}
+
+TEST_F(Cli, WatchOfNoFolderExitsWith3) {
+  EXPECT_EQ(run("watch --model gear --unit mm --dir", {path("missing")}).exit_code, 3);
+}
+
+TEST_F(Cli, TheShellCompletesCommandsOptionsWordsAndModels) {
+  const auto complete = [&](const std::string& words, int last) {
+    const std::string script = "PATH=$(dirname " BINPOSE_COMMAND "):$PATH BINPOSE_SERVER=" + server_.address() +
+                               " bash -c 'source <(binpose completion); COMP_WORDS=(" + words +
+                               "); COMP_CWORD=" + std::to_string(last) + "; _binpose; echo \"${COMPREPLY[@]}\"' >" +
+                               path("completed");
+    EXPECT_EQ(std::system(script.c_str()), 0);  // NOLINT(cert-env33-c)
+    return files_.read("completed");
+  };
+  EXPECT_EQ(complete("binpose det", 1), "detect\n");
+  EXPECT_EQ(complete("binpose detect --min", 2), "--min-score\n");
+  EXPECT_EQ(complete("binpose train --unit m", 3), "m mm\n");
+  EXPECT_EQ(complete("binpose detect --model ge", 3), "gear\n");
 }
 
 TEST_F(Cli, ServerOnTheCommandLineOverridesTheEnvironment) {

@@ -46,6 +46,9 @@ TEST(Client, ListsGetsAndDeletesModels) {
   const absl::StatusOr<v1::Model> model = client.get_model("gear");
   ASSERT_TRUE(model.ok()) << model.status();
   EXPECT_EQ(model->id(), "gear");
+  const absl::StatusOr<v1::GetModelShapeResponse> shape = client.get_model_shape("gear");
+  ASSERT_TRUE(shape.ok()) << shape.status();
+  EXPECT_EQ(shape->surface(), "twelve bytes");
   EXPECT_TRUE(client.delete_model("gear").ok());
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
 
 #include <chrono>
 #include <functional>
@@ -20,6 +21,7 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
   using Answer = std::function<v1::DetectResponse(const v1::DetectRequest&)>;
 
   FakeServer() {
+    grpc::EnableDefaultHealthCheckService(true);
     grpc::ServerBuilder builder;
     builder.SetMaxReceiveMessageSize(-1);
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
@@ -32,6 +34,8 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
   FakeServer& operator=(const FakeServer&) = delete;
 
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+
+  void set_serving(bool serves) { server_->GetHealthCheckService()->SetServingStatus("", serves); }
 
   // To be set before the first call.
   Answer answer = [](const v1::DetectRequest&) { return v1::DetectResponse(); };
@@ -97,6 +101,12 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
                         v1::Model* model) override {
     model->set_id(request->id());
     model->set_diameter(0.1);
+    return call_status;
+  }
+
+  grpc::Status GetModelShape(grpc::ServerContext* /*context*/, const v1::GetModelShapeRequest* /*request*/,
+                             v1::GetModelShapeResponse* shape) override {
+    shape->set_surface("twelve bytes");
     return call_status;
   }
 

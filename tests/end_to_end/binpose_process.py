@@ -40,6 +40,11 @@ class Server:
     def thread_count(self):
         return len(list(Path(f"/proc/{self._process.pid}/task").iterdir()))
 
+    @staticmethod
+    def help(command):
+        """What the client says about a subcommand."""
+        return subprocess.run([BIN / "binpose", command, "--help"], capture_output=True, text=True, check=True).stdout
+
     def binpose(self, *arguments):
         """Runs the client; returns the finished process with its output as text."""
         return subprocess.run([BIN / "binpose", *arguments, "--server", self.address], capture_output=True, text=True,

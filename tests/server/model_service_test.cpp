@@ -10,7 +10,13 @@
 namespace binpose::server {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::Ge;
+using ::testing::Gt;
 using ::testing::HasSubstr;
+using ::testing::Lt;
 using ::testing::Test;
 
 /// Multiplies the coordinates of a binary STL.
@@ -35,6 +41,13 @@ class ModelServiceTest : public Test {
     return server_.models().GetModel(&context, request, model);
   }
 
+  grpc::Status get_shape(const std::string& id, v1::GetModelShapeResponse* shape) {
+    grpc::ClientContext context;
+    v1::GetModelShapeRequest request;
+    request.set_id(id);
+    return server_.models().GetModelShape(&context, request, shape);
+  }
+
   grpc::Status remove(const std::string& id) {
     grpc::ClientContext context;
     v1::DeleteModelRequest request;
@@ -54,6 +67,44 @@ class ModelServiceTest : public Test {
 
   RunningServer server_;
 };
+
+/// Packed numbers, as they came over the wire.
+template <typename Number>
+std::vector<Number> unpack(const std::string& bytes) {
+  std::vector<Number> numbers(bytes.size() / sizeof(Number));
+  std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(Number));
+  return numbers;
+}
+
+TEST_F(ModelServiceTest, AShapeHoldsThePointsAndPairsOfTheModelInMetres) {
+  ASSERT_TRUE(server_.train(train_request("block")).ok());
+  v1::Model model;
+  ASSERT_TRUE(get("block", &model).ok());
+  v1::GetModelShapeResponse shape;
+  ASSERT_TRUE(get_shape("block", &shape).ok());
+  const std::vector<float> surface = unpack<float>(shape.surface());
+  const std::vector<float> observability = unpack<float>(shape.observability());
+  ASSERT_GT(surface.size(), 300U);
+  EXPECT_EQ(shape.normals().size(), shape.surface().size());
+  EXPECT_EQ(observability.size(), surface.size() / 3);
+  for (std::size_t i = 0; i < surface.size(); i += 3) {
+    EXPECT_LE(surface[i], model.bounding_box_max().x() + 1e-6);
+    EXPECT_GE(surface[i], model.bounding_box_min().x() - 1e-6);
+  }
+  // No point of a closed surface is seen from much more than half of all viewpoints.
+  EXPECT_THAT(observability, Each(AllOf(Ge(0.0F), Lt(0.6F))));
+  EXPECT_THAT(observability, Contains(Gt(0.2F)));
+  const std::size_t point_count = unpack<float>(shape.pair_points()).size() / 3;
+  EXPECT_EQ(point_count, model.point_count());
+  EXPECT_EQ(unpack<std::uint32_t>(shape.pairs()).size(), 3 * model.pair_count());
+  EXPECT_THAT(unpack<std::uint32_t>(shape.pairs()), Each(Lt(point_count)));
+}
+
+TEST_F(ModelServiceTest, TheShapeOfAnUnknownModelIsNotFound) {
+  v1::GetModelShapeResponse shape;
+  EXPECT_EQ(get_shape("ghost", &shape).error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(get_shape("../ghost", &shape).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
 
 TEST_F(ModelServiceTest, TrainingReportsProgressThatNeverFallsAndEndsWithTheModel) {
   std::vector<v1::TrainResponse> messages;

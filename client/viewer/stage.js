@@ -1,0 +1,157 @@
+// The room in which things are shown: renderer, camera, controls, scale bar and axes.
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+const AXIS_COLOURS = { x: "#ff6b6b", y: "#6bd66b", z: "#6ba8ff" };
+const FIELD_OF_VIEW = 32; // degrees
+const SCALE_BAR_PIXELS = 140; // at most
+
+export class Stage {
+  /** `pole` is the direction that counts as up; `front` the one from which things are looked at first. */
+  constructor({ pole, front }) {
+    this.host = document.getElementById("stage");
+    this.pole = pole.clone().normalize();
+    this.front = front.clone().normalize();
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.host.prepend(this.renderer.domElement);
+    this.canvas = this.renderer.domElement;
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color("#12161c");
+    this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1e5);
+    this.camera.up.copy(this.pole);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.addEventListener("change", () => this.render());
+    this.addLights();
+    this.triad = new Triad(document.getElementById("axes"));
+    new ResizeObserver(() => this.resize()).observe(this.host);
+    this.resize();
+  }
+
+  addLights() {
+    const sky = new THREE.HemisphereLight("#ffffff", "#5b6675", 1.5);
+    sky.position.copy(this.pole);
+    this.scene.add(sky);
+    const lamp = new THREE.DirectionalLight("#ffffff", 2.2);
+    lamp.position.set(-0.35, 0.5, 1);
+    this.camera.add(lamp, lamp.target);
+    this.scene.add(this.camera);
+  }
+
+  /** Looks at a sphere from `tilt` degrees off the pole; without a tilt, from where the camera stands. */
+  look(centre, radius, tilt) {
+    const offset = new THREE.Vector3();
+    if (tilt === undefined) {
+      offset.subVectors(this.camera.position, this.controls.target).normalize();
+    } else {
+      const angle = THREE.MathUtils.degToRad(Math.max(tilt, 0.01));
+      offset.addScaledVector(this.pole, Math.cos(angle)).addScaledVector(this.front, Math.sin(angle));
+    }
+    const half = THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2);
+    const narrow = Math.atan(Math.tan(half) * Math.min(1, this.camera.aspect));
+    const distance = radius / Math.sin(narrow);
+    this.camera.near = distance / 100;
+    this.camera.far = distance * 100;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).addScaledVector(offset, distance);
+    this.controls.update();
+    this.render();
+  }
+
+  /** Turns the camera about the pole. */
+  turn(degrees) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    offset.applyAxisAngle(this.pole, THREE.MathUtils.degToRad(degrees));
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.render();
+  }
+
+  /** Size for a PointsMaterial whose points shall measure `millimetres`. */
+  pointSize(millimetres) {
+    return millimetres / Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
+  }
+
+  /** Calls `act` with the nearest of `objects` under a click or tap, or with nothing. */
+  onPick(objects, act) {
+    let down = null;
+    this.canvas.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
+    this.canvas.addEventListener("pointerup", (event) => {
+      if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 5) return; // a drag
+      const box = this.canvas.getBoundingClientRect();
+      const ray = new THREE.Raycaster();
+      const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1,
+        1 - ((event.clientY - box.top) / box.height) * 2);
+      ray.setFromCamera(at, this.camera);
+      act(ray.intersectObjects(objects().filter(isShown), false)[0]?.object);
+    });
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.render();
+  }
+
+  /** Draws once, with the next frame; however often it is asked. */
+  render() {
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame(() => {
+      this.isAsked = false;
+      this.renderer.render(this.scene, this.camera);
+      this.drawScale();
+      this.triad.turn(this.camera);
+    });
+  }
+
+  /** The scale bar holds at the depth of the point that the camera turns about. */
+  drawScale() {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const perPixel = (2 * distance * Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2))) / this.host.clientHeight;
+    const most = SCALE_BAR_PIXELS * perPixel;
+    const decade = 10 ** Math.floor(Math.log10(most));
+    const length = [5, 2, 1].map((n) => n * decade).find((n) => n <= most);
+    const bar = document.getElementById("scale");
+    bar.firstElementChild.style.width = `${length / perPixel}px`;
+    bar.lastElementChild.textContent = length < 1000 ? `${+length.toPrecision(1)} mm` : `${length / 1000} m`;
+  }
+}
+
+const isShown = (object) => object === null || (object.visible && isShown(object.parent));
+
+/** The axes of the scene frame as the camera sees them, drawn in a corner. */
+class Triad {
+  constructor(host) {
+    const line = (name) => `<line x2="0" y2="0" stroke="${AXIS_COLOURS[name]}"/><text fill="${AXIS_COLOURS[name]}">${name}</text>`;
+    host.innerHTML = `<svg viewBox="-40 -40 80 80">${["x", "y", "z"].map((name) => `<g>${line(name)}</g>`).join("")}</svg>`;
+    this.groups = [...host.querySelectorAll("g")];
+  }
+
+  turn(camera) {
+    const inverse = camera.quaternion.clone().invert();
+    const drawn = this.groups.map((group, i) => {
+      const axis = new THREE.Vector3().setComponent(i, 1).applyQuaternion(inverse);
+      const [line, text] = group.children;
+      line.setAttribute("x2", 26 * axis.x);
+      line.setAttribute("y2", -26 * axis.y);
+      text.setAttribute("x", 34 * axis.x);
+      text.setAttribute("y", -34 * axis.y);
+      return [axis.z, group];
+    });
+    for (const [, group] of drawn.sort(([a], [b]) => a - b)) group.parentNode.append(group);
+  }
+}
+
+/** A frame as three coloured lines. */
+export function frameLines(length) {
+  const lines = new THREE.AxesHelper(length);
+  lines.setColors(AXIS_COLOURS.x, AXIS_COLOURS.y, AXIS_COLOURS.z);
+  lines.material.depthTest = false;
+  lines.renderOrder = 1;
+  return lines;
+}

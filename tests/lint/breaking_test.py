@@ -1,0 +1,57 @@
+"""The promise of proto/README.md: within v1 fields are only added. Held by `buf breaking` against the last tag.
+
+Usage: breaking_test.py NODE_MODULES, the folder that tests/run.sh installed buf into.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+NOT_INSTALLED = 77  # for ctest: skipped
+
+
+def breaking(now, before):
+    """What `buf breaking` finds; empty if nothing breaks."""
+    return subprocess.run([BUF, "breaking", now, "--against", before], cwd=ROOT, capture_output=True, text=True).stdout
+
+
+class BreakingTest(unittest.TestCase):
+    def changed(self, pattern, replacement):
+        """A copy of proto/ with one change in its model service."""
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        copy = Path(directory.name) / "proto"
+        shutil.copytree(ROOT / "proto", copy)
+        file = copy / "binpose/v1/model_service.proto"
+        text, count = re.subn(pattern, replacement, file.read_text(), count=1)
+        self.assertEqual(count, 1)
+        file.write_text(text)
+        return copy
+
+    def test_nothing_breaks_since_the_last_tag(self):
+        last = subprocess.run(["git", "describe", "--tags", "--abbrev=0"], cwd=ROOT, capture_output=True, text=True)
+        if last.returncode != 0:
+            self.skipTest("no tag yet: nothing was promised")
+        self.assertEqual(breaking("proto", f".git#tag={last.stdout.strip()},subdir=proto"), "")
+
+    def test_a_field_that_goes_or_changes_is_noticed(self):
+        self.assertIn("diameter", breaking(self.changed(r"  double diameter = 2;\n", ""), "proto"))
+        self.assertNotEqual(breaking(self.changed("double diameter = 2", "float diameter = 2"), "proto"), "")
+        self.assertNotEqual(breaking(self.changed("double diameter = 2", "double size = 2"), "proto"), "")
+
+    def test_a_new_field_breaks_nothing(self):
+        new = self.changed("  double diameter = 2;", "  double diameter = 2;\n  double weight = 99;")
+        self.assertEqual(breaking(new, "proto"), "")
+
+
+if __name__ == "__main__":
+    BUF = Path(sys.argv.pop(1)) / ".bin/buf"
+    if not BUF.exists():
+        print("buf is not installed; tests/run.sh installs it from npm.")
+        sys.exit(NOT_INSTALLED)
+    unittest.main()
