@@ -9,7 +9,7 @@ build="cmake g++ ninja-build
   libabsl-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
 test="clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev
-  pkgconf python3 shellcheck"
+  pkgconf python3 python3-matplotlib shellcheck"
 case "${1:-}" in
   run) packages=$run ;;
   build) packages=$build ;;
