@@ -80,7 +80,8 @@ def weights(log, path):
     axis.grid(alpha=0.3)
     time = axis.twinx()
     times = [[1000 * run["seconds"] for run in measured(log, name)] for name in names]
-    time.plot(places, [statistics.median(values) for values in times], color="tab:red", marker="s", markersize=4)
-    time.set_ylim(bottom=0)
+    medians = [statistics.median(values) for values in times]
+    time.plot(places, medians, color="tab:red", marker="s", markersize=4)
+    time.set_ylim(0, 2 * max(medians))  # below the rates
     time.set_ylabel("median ms a scene", color="tab:red")
     save(figure, path)
