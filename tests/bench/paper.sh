@@ -27,10 +27,13 @@ results=$build/paper/$mode/$(sha256sum "$paper" | cut -c 1-12)
 mkdir -p "$results"
 # The table, whose times count, has a core for itself; the figures share another.
 "$paper" table "$parts" "$scenes" "$results/table.jsonl" &
+table=$!
+trap 'kill "$table" 2>/dev/null || true' EXIT
 "$paper" accuracy "$parts" "$results/accuracy.jsonl"
 "$paper" pictures "$parts" "$scenes" "$results/pictures.jsonl"
 "$paper" sweep "$parts" "$scenes" "$results/sweep.jsonl"
-wait $!
+wait "$table"
+trap - EXIT
 
 # Debian's Python, to which python3-matplotlib belongs.
 /usr/bin/python3 tests/bench/paper/report.py "$results" "$scenes" tests/bench/PAPER.md
