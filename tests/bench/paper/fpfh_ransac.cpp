@@ -31,7 +31,7 @@ struct FpfhModel {
 };
 
 Descriptors::Ptr to_pcl(const LocalFeatures& features) {
-  const Descriptors::Ptr descriptors(new Descriptors);
+  Descriptors::Ptr descriptors(new Descriptors);
   for (const auto& row : features.descriptors.rowwise()) {
     pcl::FPFHSignature33 descriptor;
     std::copy(row.begin(), row.end(), descriptor.histogram);

@@ -29,7 +29,7 @@ Cloud::Ptr oriented_cloud(const PointCloud& scan, double spacing) {
   pcl::PointCloud<pcl::PointXYZ> thinned;
   grid.filter(thinned);
 
-  const Cloud::Ptr cloud(new Cloud);
+  Cloud::Ptr cloud(new Cloud);
   pcl::copyPointCloud(thinned, *cloud);
   pcl::NormalEstimation<pcl::PointNormal, pcl::PointNormal> normals;  // towards (0, 0, 0) unless told otherwise
   normals.setInputCloud(cloud);
@@ -64,7 +64,7 @@ Cloud::Ptr keypoints(const Cloud::Ptr& cloud, double spacing) {
   pcl::UniformSampling<pcl::PointNormal> sampling;
   sampling.setRadiusSearch(spacing);
   sampling.setInputCloud(cloud);
-  const Cloud::Ptr kept(new Cloud);
+  Cloud::Ptr kept(new Cloud);
   sampling.filter(*kept);
   return kept;
 }

@@ -30,7 +30,7 @@ struct ShotModel {
 };
 
 pcl::CorrespondencesPtr correspondences(const LocalFeatures& model, const LocalFeatures& scene) {
-  const pcl::CorrespondencesPtr all(new pcl::Correspondences);
+  pcl::CorrespondencesPtr all(new pcl::Correspondences);
   const std::vector<Nearest> nearest = nearest_features(scene, model);
   for (std::size_t i = 0; i < nearest.size(); ++i) {
     all->emplace_back(nearest[i].index, static_cast<int>(i), nearest[i].squared_distance);
@@ -55,6 +55,7 @@ std::vector<Pose> grouped(const LocalFeatures& model, const LocalFeatures& scene
                    [&](std::size_t a, std::size_t b) { return groups[a].size() > groups[b].size(); });
   order.resize(std::min(order.size(), kMostGroups));
   std::vector<Pose> poses;
+  poses.reserve(order.size());
   for (const std::size_t i : order) poses.emplace_back(transforms[i].cast<double>());
   return poses;
 }
