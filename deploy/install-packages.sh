@@ -9,8 +9,8 @@ build="cmake g++ ninja-build
   libabsl-dev libcivetweb-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
 test="chromium chromium-driver clang-format clang-tidy libbullet-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev
-  nlohmann-json3-dev openssl pkgconf prometheus python3 python3-grpcio python3-numpy python3-pil python3-protobuf
-  python3-selenium python3-setuptools python3-yaml shellcheck systemd"
+  nlohmann-json3-dev openssl pkgconf prometheus python3 python3-grpcio python3-matplotlib
+  python3-numpy python3-pil python3-protobuf python3-selenium python3-setuptools python3-yaml shellcheck systemd"
 # Node.js from elsewhere brings its own npm and conflicts with Debian's.
 command -v npm >/dev/null || build="$build npm ca-certificates"
 case "${1:-}" in

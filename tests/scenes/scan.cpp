@@ -105,20 +105,40 @@ PointCloud frame(const Mesh& bin, const Pose& T_scene_bin, const Scanner& scanne
   return cloud;
 }
 
-/// Scans into `cloud` and counts the points on each object.
-std::vector<int> measure_all(const RayScene& scene, const Scanner& scanner, const Random& random, int objects,
-                             PointCloud& cloud) {
-  const Measuring measure(scene, scanner, *cloud.intrinsics);
-  std::vector<int> count(objects, 0);
-  for (std::uint32_t v = 0, pixel = 0; v < cloud.height; ++v) {
-    for (std::uint32_t u = 0; u < cloud.width; ++u, ++pixel) {
-      const auto found = measure.at(static_cast<int>(u), static_cast<int>(v), random.fork(pixel));
-      if (!found) continue;
-      cloud.points[pixel] = found->point.cast<float>();
-      if (found->object) ++count[*found->object];
+/// A rectangle of pixels, the upper bounds not included.
+struct Region {
+  std::uint32_t first_u = 0, first_v = 0, end_u = 0, end_v = 0;
+};
+
+Region whole(const PointCloud& cloud) { return {0, 0, cloud.width, cloud.height}; }
+
+/// The pixels that a posed part may show in.
+Region region_of(const Mesh& part, const Pose& T_scene_model, const PointCloud& cloud) {
+  const CameraIntrinsics& camera = *cloud.intrinsics;
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector3f& vertex : part.vertices) {
+    const Eigen::Vector3d p = T_scene_model * vertex.cast<double>();
+    box.extend(Eigen::Vector2d(camera.fx * p.x() / p.z() + camera.cx, camera.fy * p.y() / p.z() + camera.cy));
+  }
+  const auto pixel = [](double at, std::uint32_t end) {
+    return static_cast<std::uint32_t>(std::clamp(at, 0.0, static_cast<double>(end)));
+  };
+  return {pixel(box.min().x() - 1, cloud.width), pixel(box.min().y() - 1, cloud.height),
+          pixel(box.max().x() + 2, cloud.width), pixel(box.max().y() + 2, cloud.height)};
+}
+
+/// Measures the pixels of a region; tells `found` of each that yields something.
+template <typename Found>
+void measure_all(const RayScene& scene, const Scanner& scanner, const Random& random, const PointCloud& frame,
+                 const Region& region, Found found) {
+  const Measuring measure(scene, scanner, *frame.intrinsics);
+  for (std::uint32_t v = region.first_v; v < region.end_v; ++v) {
+    for (std::uint32_t u = region.first_u; u < region.end_u; ++u) {
+      const std::uint32_t pixel = v * frame.width + u;
+      const auto measurement = measure.at(static_cast<int>(u), static_cast<int>(v), random.fork(pixel));
+      if (measurement) found(pixel, *measurement);
     }
   }
-  return count;
 }
 
 }  // namespace
@@ -129,24 +149,28 @@ Scan scan_bin(const Mesh& part, const std::vector<Pose>& T_bin_models, const Bin
   scan.T_scene_bin = place_bin(scanner, random.fork(0));
   const Mesh box = bin_mesh(bin);
   scan.cloud = frame(box, scan.T_scene_bin, scanner);
-  const PointCloud nothing = scan.cloud;
   const Random noise = random.fork(1);
 
   RayScene pile;  // object 0 is the bin, the parts follow
   pile.add(box, scan.T_scene_bin);
-  for (const Pose& T_bin_model : T_bin_models) pile.add(part, scan.T_scene_bin * T_bin_model);
+  for (const Pose& T_bin_model : T_bin_models) {
+    scan.instances.push_back({scan.T_scene_bin * T_bin_model});
+    pile.add(part, scan.instances.back().T_scene_model);
+  }
   pile.build();
-  const std::vector<int> visible =
-      measure_all(pile, scanner, noise, static_cast<int>(T_bin_models.size()) + 1, scan.cloud);
+  measure_all(pile, scanner, noise, scan.cloud, whole(scan.cloud), [&](std::uint32_t pixel, const Measurement& found) {
+    scan.cloud.points[pixel] = found.point.cast<float>();
+    if (found.object && *found.object > 0) ++scan.instances[*found.object - 1].visible_points;
+  });
 
-  for (std::size_t i = 0; i < T_bin_models.size(); ++i) {
+  for (Instance& instance : scan.instances) {
     RayScene alone;
     alone.add(box, scan.T_scene_bin);
-    alone.add(part, scan.T_scene_bin * T_bin_models[i]);
+    alone.add(part, instance.T_scene_model);
     alone.build();
-    PointCloud unused = nothing;
-    const int alone_points = measure_all(alone, scanner, noise, 2, unused)[1];
-    scan.instances.push_back({scan.T_scene_bin * T_bin_models[i], visible[i + 1], alone_points});
+    const Region region = region_of(part, instance.T_scene_model, scan.cloud);
+    measure_all(alone, scanner, noise, scan.cloud, region,
+                [&](std::uint32_t, const Measurement& found) { instance.alone_points += found.object == 1U; });
   }
   return scan;
 }

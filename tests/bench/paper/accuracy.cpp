@@ -1,0 +1,77 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tests/bench/paper/over_scenes.h"
+#include "tests/bench/paper/runs.h"
+#include "tests/bench/paper/scan_alone.h"
+#include "tests/bench/paper/vector_pairs.h"
+#include "tests/scenes/random.h"
+
+namespace binpose::paper {
+namespace {
+
+constexpr int kDensitiesMm[] = {3, 1};  // between points: the paper's, and a finer one
+constexpr double kMostTurn = 30;        // degrees, about each axis
+constexpr double kMostShift = 0.3;      // metres, along each axis
+constexpr double kDistance = 0.8;       // metres, from the sensor to the middle of the places
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+/// Turned about x, y and z, then shifted, at random.
+Pose random_pose(scenes::Random random) {
+  const auto angle = [&] { return random.uniform(-kMostTurn, kMostTurn) / kDegrees; };
+  const auto shift = [&] { return random.uniform(-kMostShift, kMostShift); };
+  const Eigen::AngleAxisd turn_x(angle(), Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd turn_y(angle(), Eigen::Vector3d::UnitY());
+  const Eigen::AngleAxisd turn_z(angle(), Eigen::Vector3d::UnitZ());
+  const double x = shift(), y = shift(), z = shift();
+  return Eigen::Translation3d(x, y, kDistance + z) * Pose(turn_z * turn_y * turn_x);
+}
+
+/// The largest of the three turns about x, y and z that lead from one rotation to the other, degrees.
+double rotation_error(const Pose& estimate, const Pose& truth) {
+  const Eigen::Matrix3d R = truth.linear().transpose() * estimate.linear();
+  const Eigen::Vector3d angles(std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
+                               std::atan2(R(1, 0), R(0, 0)));
+  return angles.cwiseAbs().maxCoeff() * kDegrees;
+}
+
+Json errors(const Finder& find, const PointCloud& cloud, const Pose& truth, const Eigen::Vector3d& centre) {
+  const std::vector<PoseHypothesis> poses = find(cloud);
+  if (poses.empty()) return nullptr;
+  const Pose& found = poses.front().T_scene_model;
+  const Eigen::Vector3d apart = found * centre - truth * centre;
+  return {{"degrees", rotation_error(found, truth)}, {"mm", 1000 * apart.cwiseAbs().maxCoeff()}};
+}
+
+}  // namespace
+
+void run_accuracy(const std::filesystem::path& parts, int count, const std::filesystem::path& output) {
+  const testing::ScenePart part = testing::read_parts(parts).front();
+  const Model paper = train_model(part, TrainParams::paper());
+  DetectParams any_score;  // the best pose counts, however sure the method is
+  any_score.min_score = 0;
+  const NamedFinders finders = {{"unrefined", finder(paper, paper_detection(false))},
+                                {"integration", finder(paper, paper_detection(true))},
+                                {"binpose", finder(train_model(part, {}), any_score)}};
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& vertex : part.mesh.vertices) box.extend(vertex.cast<double>());
+
+  RunLog log(output);
+  const scenes::Random random(5);
+  for (const int density_mm : kDensitiesMm) {
+    for (int i = 0; i < count; ++i) {
+      const std::string key = std::to_string(density_mm) + " mm, scene " + std::to_string(i);
+      if (log.has(key)) continue;
+      const Pose T_scene_model = random_pose(random.fork(i));
+      const PointCloud cloud = scan_alone(part.mesh, T_scene_model, 0.001 * density_mm);
+      Json results;
+      for (const auto& [name, find] : finders) results[name] = errors(find, cloud, T_scene_model, box.center());
+      log.add(key, {{"density_mm", density_mm}, {"results", results}});
+      if ((i + 1) % 50 == 0) show_progress("accuracy", i + 1, count, std::to_string(density_mm) + " mm");
+    }
+  }
+}
+
+}  // namespace binpose::paper

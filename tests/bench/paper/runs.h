@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+
+/// The experiments of the paper's section V. Each goes on where an earlier run with the same output was stopped.
+namespace binpose::paper {
+
+/// Table I: every method on every scene, one thread.
+void run_table(const std::filesystem::path& parts, const std::filesystem::path& scenes,
+               const std::filesystem::path& output);
+
+/// Fig. 8 and 9: the paper's preset over the number of vector pairs and over the weights of [Eq. 7]; and the preset as
+/// the paper has it, without refinement.
+void run_sweep(const std::filesystem::path& parts, const std::filesystem::path& scenes,
+               const std::filesystem::path& output);
+
+/// Fig. 5: part A moved at random, `count` times.
+void run_accuracy(const std::filesystem::path& parts, int count, const std::filesystem::path& output);
+
+/// Fig. 3, 6, 7: what their pictures show, a line for each part.
+void write_pictures(const std::filesystem::path& parts, const std::filesystem::path& scenes,
+                    const std::filesystem::path& output);
+
+}  // namespace binpose::paper
