@@ -7,6 +7,7 @@
 #include "core/detect/verify.h"
 #include "core/geometry/depth_map.h"
 #include "core/model.h"
+#include "core/run_control.h"
 
 namespace binpose {
 

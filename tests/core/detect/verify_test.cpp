@@ -57,6 +57,53 @@ TEST(Verify, ExplainsNearlyAllAtTheTruth) {
   }
 }
 
+/// What verify() computes for eight points at a time, one point after the other.
+Evidence surface_evidence_by_loop(const Scan& scan, const Eigen::Isometry3f& T, const VerifyOptions& options) {
+  Evidence sum;
+  double total = 0;
+  const float slack = options.tolerance + 1.5F * scan.map.pixel_size;
+  for (const std::uint16_t i : visible_points(scan.model, T)) {
+    const Eigen::Vector3f p = T * scan.model.surface[i].position;
+    const Eigen::Vector3f normal = T.linear() * scan.model.surface[i].normal;
+    const float facing = -normal.dot(p.normalized());
+    if (facing < 0.25882F) continue;
+    total += facing;
+    const int pixel = scan.map.pixel_of(p);
+    if (pixel < 0 || !scan.map.measured(pixel)) continue;
+    const float distance = std::abs(normal.dot(scan.map.points[pixel] - p));
+    const float step = scan.map.points[pixel].z() - p.z();
+    if (distance <= options.tolerance && std::abs(step) < 3 * slack) {
+      const bool same = !scan.map.background[pixel] && scan.map.has_normal(pixel) &&
+                        normal.dot(scan.map.normals[pixel]) >= options.normal_cosine;
+      (same ? sum.explained : sum.unexplained) += facing;
+    } else {
+      (step > slack ? sum.violated : step < -slack ? sum.occluded : sum.unexplained) += facing;
+    }
+  }
+  for (float* share : {&sum.explained, &sum.unexplained, &sum.violated, &sum.occluded}) {
+    *share /= static_cast<float>(total);
+  }
+  return sum;
+}
+
+TEST(Verify, ComparesEightPointsAtATimeAsALoopDoesOneByOne) {
+  const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
+                                        testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
+  for (const Pose& pose : {kLying, kTilted}) {
+    const Scan scan(testing::l_block(), pose, {in_front});
+    for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
+      const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
+      const Evidence fast = verify(scan.map, scan.model, T, scan.options());
+      const Evidence slow = surface_evidence_by_loop(scan, T, scan.options());
+      // A point on a limit may fall to either side.
+      EXPECT_NEAR(fast.explained, slow.explained, 2e-3F);
+      EXPECT_NEAR(fast.unexplained, slow.unexplained, 2e-3F);
+      EXPECT_NEAR(fast.violated, slow.violated, 2e-3F);
+      EXPECT_NEAR(fast.occluded, slow.occluded, 2e-3F);
+    }
+  }
+}
+
 TEST(Verify, SharesAddUpToAtMostAll) {
   const Scan scan(testing::l_block(), kTilted);
   for (const double by : {0.0, 0.05, 0.2, 0.5, -0.1}) {

@@ -112,6 +112,31 @@ TEST(DepthMap, HoldsTheNearestPointOfEachPixel) {
   for (std::size_t i = 0; i < nearest.size(); ++i) ASSERT_EQ(map.points[i].z(), nearest[i]) << i;
 }
 
+/// A wall at 1 m with a point each 4 mm but the middle one; from `step_column` on it lies `step` deeper.
+DepthMap wall_with_a_hole(int step_column, float step) {
+  std::vector<Vector3f> points;
+  for (int v = -10; v <= 10; ++v) {
+    for (int u = -10; u <= 10; ++u) {
+      const float z = 1 + (u >= step_column ? step : 0);
+      if (u != 0 || v != 0)
+        points.emplace_back(0.004F * static_cast<float>(u) * z, 0.004F * static_cast<float>(v) * z, z);
+    }
+  }
+  return depth_map(*sensor_view(unordered(points)), 0.004);
+}
+
+TEST(DepthMap, FillsASinglePixelBetweenNeighboursOfOneSurface) {
+  const DepthMap whole = wall_with_a_hole(100, 0);
+  EXPECT_EQ(std::count_if(whole.points.begin(), whole.points.end(), [](const Vector3f& p) { return p.z() > 0; }), 441);
+  for (const Vector3f& p : whole.points) EXPECT_TRUE(p.z() == 0 || std::abs(p.z() - 1) < 1e-3F);
+}
+
+TEST(DepthMap, LeavesAPixelEmptyAtADepthStep) {
+  const DepthMap stepped = wall_with_a_hole(1, 0.1F);
+  EXPECT_EQ(std::count_if(stepped.points.begin(), stepped.points.end(), [](const Vector3f& p) { return p.z() > 0; }),
+            440);
+}
+
 TEST(DepthMap, HasPixelsOfTheWantedSize) {
   const SensorView view = *sensor_view(block_over_floor());
   const DepthMap map = depth_map(view, 0.004);

@@ -149,6 +149,16 @@ TEST(Normals, TellTheNoiseOfTheSensor) {
   for (const double noise : {1e-4, 4e-4}) EXPECT_NEAR(map_of({&block, 1}, 0.5, noise).noise, noise, 0.25 * noise);
 }
 
+TEST(Normals, ErrFromAWindowAsLeastSquaresOverItsOffsets) {
+  for (const int radius : {1, 2, 3}) {
+    double sum_sq = 0;
+    for (int v = -radius; v <= radius; ++v) {
+      for (int u = -radius; u <= radius; ++u) sum_sq += u * u;
+    }
+    EXPECT_NEAR(normal_error(0.0001, 0.001, radius), 0.1 / std::sqrt(sum_sq), 1e-12);
+  }
+}
+
 TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
   const DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
