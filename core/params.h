@@ -52,12 +52,12 @@ enum class Verification {
 
 /// How a cloud is searched.
 struct DetectParams {
-  double min_score = 0.3;                  ///< [0, 1]
+  double min_score = 0.33;                 ///< [0, 1]
   int max_results = 100;                   ///< [1, 1000]
-  double start_point_share = 0.15;         ///< share of the down-sampled points that pairs start from, [0.001, 1]
+  double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
-  int cluster_limit = 800;   ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
+  int cluster_limit = 1000;  ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
   bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement
   bool refine = true;        ///< point-to-plane, after clustering
   Verification verification = Verification::kVisibleSurface;

@@ -15,16 +15,7 @@
 namespace binpose::server {
 
 /// The methods that are measured.
-enum class Method {
-  kTrain,
-  kGetModel,
-  kGetModelShape,
-  kListModels,
-  kDeleteModel,
-  kExportModel,
-  kImportModel,
-  kDetect
-};
+enum class Method { kTrain, kGetModel, kGetModelShape, kListModels, kDeleteModel, kExportModel, kImportModel, kDetect };
 
 /// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
 class Metrics {

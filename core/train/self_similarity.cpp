@@ -17,7 +17,7 @@ namespace {
 // Lengths as shares of the diameter.
 constexpr double kReach = 0.1;  // of the coarse search
 constexpr double kGridCell = 0.025;
-constexpr double kOnSurface = 0.012;  // a point this near to the surface is on it
+constexpr double kOnSurface = 0.014;  // a point this near to the surface is on it
 constexpr double kSamePose = 0.06;    // turns that move no corner of the box farther apart are one
 
 constexpr int kDirections = 400;  // 10 degrees apart
@@ -30,7 +30,7 @@ constexpr std::size_t kRefinePoints = 150;
 constexpr std::size_t kGlancedPoints = 400;  // a first judgement
 constexpr std::size_t kJudgedPoints = 4000;
 constexpr double kSimilarShare = 0.75;  // of the surface that a turn must leave on itself
-constexpr double kSameShare = 0.998;    // ... to count as symmetry: the rest is rounding of the mesh
+constexpr double kSameShare = 0.995;    // ... to count as symmetry: the rest is rounding of the mesh
 constexpr std::size_t kMostSimilar = 64;
 constexpr float kFlank = 0.45F;  // radians, about 26 degrees, within which a turn may lie on another's flank
 constexpr double kDip = 0.002;   // of the share, between two peaks
