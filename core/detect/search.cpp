@@ -104,6 +104,8 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
     }
     stats.cluster_count += candidates.size();
   }
+  // The paper compares each cluster with all points, and with nothing before.
+  if (params.verification == Verification::kAllPoints) return candidates;
   const StageTimer timer(stats.verify_seconds);
   VerifyOptions coarse;
   coarse.tolerance = kCoarseTolerance * diameter;
