@@ -44,6 +44,7 @@ VariantChoice choose_variant(const DepthMap& map, const Model& model, const Eige
   std::vector<Eigen::Isometry3f> poses = {T_view_model};
   for (const Pose& T_model_model : model.similar_poses) poses.push_back(T_view_model * T_model_model.cast<float>());
   std::vector<float> evidence;
+  evidence.reserve(poses.size());
   for (const Eigen::Isometry3f& pose : poses) evidence.push_back(telling_evidence(map, model, pose, options));
   const auto best = std::max_element(evidence.begin(), evidence.end());
   float odds = 0;

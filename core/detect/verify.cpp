@@ -82,13 +82,13 @@ struct SurfaceSums {
                                   float normal_cosine) {
     const Lanes zero = {};
     const Lanes facing = -dot(b.normal, b.point) / root(dot(b.point, b.point));
-    const Lanes weight = (b.point.z > 0) & (facing >= kSteepest) ? facing : zero;
+    const Lanes weight = ((b.point.z > 0) & (facing >= kSteepest)) ? facing : zero;
     const Lanes judged = b.scene_point.z > 0 ? weight : zero;
     const Lanes distance = dot(b.normal, b.scene_point - b.point);
     const Lanes step = b.scene_point.z - b.point.z;
     // A depth step of a slanted surface within a pixel is no contradiction.
-    const Lanes at = (magnitude(distance) <= tolerance) & (magnitude(step) < 3 * slack) ? judged : zero;
-    const Lanes same = (b.scene_normal.z != 0) & (dot(b.normal, b.scene_normal) >= normal_cosine) ? at * free : zero;
+    const Lanes at = ((magnitude(distance) <= tolerance) & (magnitude(step) < 3 * slack)) ? judged : zero;
+    const Lanes same = ((b.scene_normal.z != 0) & (dot(b.normal, b.scene_normal) >= normal_cosine)) ? at * free : zero;
     const Lanes off = judged - at;
     const Lanes behind = step > slack ? off : zero, before = step < -slack ? off : zero;
     total += weight;

@@ -25,6 +25,7 @@ std::vector<Eigen::Vector3d> outermost(const Mesh& mesh) {
     indices.insert(best);
   }
   std::vector<Eigen::Vector3d> points;
+  points.reserve(indices.size());
   for (const std::size_t i : indices) points.emplace_back(mesh.vertices[i].cast<double>());
   return points;
 }

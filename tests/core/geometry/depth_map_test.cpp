@@ -118,8 +118,9 @@ DepthMap wall_with_a_hole(int step_column, float step) {
   for (int v = -10; v <= 10; ++v) {
     for (int u = -10; u <= 10; ++u) {
       const float z = 1 + (u >= step_column ? step : 0);
-      if (u != 0 || v != 0)
+      if (u != 0 || v != 0) {
         points.emplace_back(0.004F * static_cast<float>(u) * z, 0.004F * static_cast<float>(v) * z, z);
+      }
     }
   }
   return depth_map(*sensor_view(unordered(points)), 0.004);

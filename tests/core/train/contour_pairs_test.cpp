@@ -122,6 +122,7 @@ TEST(SelectContourPairs, RanksBySharedViewsOverTheRootOfFrequency) {
 
 TEST(SelectContourPairs, LetsNoPointTakePartInMoreThan40) {
   std::vector<PooledContour> contours;
+  contours.reserve(200);
   for (int i = 0; i < 200; ++i) contours.push_back({on_circle(i, 200), ViewMask(2, ~std::uint64_t{0})});
   std::map<int, int> used;
   for (const ContourPair& pair : select_contour_pairs(contours, kDiameter, 100'000, 128, {}).pairs) {

@@ -26,6 +26,7 @@ TEST(PairValue, OfEachSelectionByHand) {
 TEST(BestPairs, AreTheFirstOfAStableSort) {
   scenes::Random random(4);
   std::vector<double> values;
+  values.reserve(500);
   for (int i = 0; i < 500; ++i) values.push_back(static_cast<double>(random.next() % 40));  // many are equal
   std::vector<std::size_t> sorted;
   for (std::size_t i = 0; i < values.size(); ++i) sorted.push_back(i);

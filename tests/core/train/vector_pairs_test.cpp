@@ -19,6 +19,7 @@ using Indices = std::tuple<int, int, int>;
 
 std::vector<Indices> indices_of(const std::vector<VectorPair>& pairs) {
   std::vector<Indices> indices;
+  indices.reserve(pairs.size());
   for (const VectorPair& pair : pairs) indices.emplace_back(pair.p, pair.q1, pair.q2);
   return indices;
 }
