@@ -15,7 +15,7 @@ namespace {
 class TokensTest : public ::testing::Test {
  protected:
   std::filesystem::path write(const char* text) {
-    const std::filesystem::path file = directory_.path() / "tokens";
+    std::filesystem::path file = directory_.path() / "tokens";
     std::ofstream(file) << text;
     return file;
   }
