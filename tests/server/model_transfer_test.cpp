@@ -31,7 +31,7 @@ grpc::Status import_model(RunningServer& server, const std::string& id, const st
     if (!stream->Write(part)) break;
   }
   stream->WritesDone();
-  const grpc::Status status = stream->Finish();
+  grpc::Status status = stream->Finish();
   model = response.model();
   return status;
 }
