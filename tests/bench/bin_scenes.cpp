@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <random>
@@ -49,6 +50,69 @@ void print(const std::string& name, const Row& row) {
       row.score.hits, row.score.instances, 100 * row.score.precision(), row.score.wrong, median(row.milliseconds));
 }
 
+/// One line of a hypothesis for whoever studies what is right and what is wrong.
+void print_hypothesis(const std::string& scene, int verdict, const PoseHypothesis& p) {
+  const Eigen::Vector3d t = p.T_scene_model.translation();
+  const Eigen::Quaterniond q(p.T_scene_model.linear());
+  std::printf(
+      "H %s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res %.3f "
+      "votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
+      scene.c_str(), verdict, p.score, p.explained_fraction, p.violated_fraction, 1 - p.visible_fraction,
+      p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence, p.explained_area,
+      1e3 * p.residual, p.votes, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+void add(DetectStats& sum, const DetectStats& s) {
+  sum.preprocess_seconds += s.preprocess_seconds;
+  sum.vote_seconds += s.vote_seconds;
+  sum.cluster_seconds += s.cluster_seconds;
+  sum.refine_seconds += s.refine_seconds;
+  sum.verify_seconds += s.verify_seconds;
+  sum.rank_seconds += s.rank_seconds;
+  sum.total_seconds += s.total_seconds;
+  sum.start_point_count += s.start_point_count;
+  sum.scene_pair_count += s.scene_pair_count;
+  sum.vote_count += s.vote_count;
+  sum.cluster_count += s.cluster_count;
+  sum.verified_count += s.verified_count;
+}
+
+/// The scenes of a folder whose names hold `filter`, in order.
+std::vector<std::filesystem::path> scene_folders(const std::string& folder, const std::string& filter) {
+  std::vector<std::filesystem::path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (std::filesystem::exists(entry.path() / "gt.json") &&
+        entry.path().filename().string().find(filter) != std::string::npos) {
+      found.push_back(entry.path());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+using Trained = std::map<std::string, std::pair<Model, PoseJudge>>;
+
+/// Trains the parts of a folder, or ends the program saying which it can't.
+Trained train_all(const std::string& parts_folder, const TrainParams& train_params, const RunControl& control) {
+  Trained trained;
+  for (const ScenePart& part : read_parts(parts_folder)) {
+    const auto start = std::chrono::steady_clock::now();
+    absl::StatusOr<Model> model = train(part.mesh, train_params, control);
+    if (!model.ok()) {
+      std::fprintf(stderr, "%s: %s\n", part.name.c_str(), model.status().ToString().c_str());
+      std::exit(1);
+    }
+    std::printf("%-16s trained in %.2f s: %zu surface points, %zu pair points, %zu pairs\n", part.name.c_str(),
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->surface.size(),
+                model->pair_points.size(), model->pairs.size());
+    std::printf("%-16s symmetry: %zu turns%s; %zu similar poses, %zu telling points\n", "",
+                model->symmetry.discrete.size(), model->symmetry.has_axis ? " and an axis" : "",
+                model->similar_poses.size(), model->telling_points.size());
+    trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
+  }
+  return trained;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -88,34 +152,12 @@ int main(int argc, char** argv) {
     detect_params = DetectParams::paper();
   }
 
-  std::map<std::string, std::pair<Model, PoseJudge>> trained;
-  for (const ScenePart& part : read_parts(parts_folder)) {
-    const auto start = std::chrono::steady_clock::now();
-    absl::StatusOr<Model> model = train(part.mesh, train_params, control);
-    if (!model.ok()) {
-      std::fprintf(stderr, "%s: %s\n", part.name.c_str(), model.status().ToString().c_str());
-      return 1;
-    }
-    std::printf("%-16s trained in %.2f s: %zu surface points, %zu pair points, %zu pairs\n", part.name.c_str(),
-                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->surface.size(),
-                model->pair_points.size(), model->pairs.size());
-    std::printf("%-16s symmetry: %zu turns%s; %zu similar poses, %zu telling points\n", "",
-                model->symmetry.discrete.size(), model->symmetry.has_axis ? " and an axis" : "",
-                model->similar_poses.size(), model->telling_points.size());
-    trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
-  }
+  const Trained trained = train_all(parts_folder, train_params, control);
 
   std::map<std::string, Row> rows;
   Row all;
   DetectStats sum;
-  std::vector<std::filesystem::path> folders;
-  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
-    if (std::filesystem::exists(entry.path() / "gt.json") &&
-        entry.path().filename().string().find(filter) != std::string::npos) {
-      folders.push_back(entry.path());
-    }
-  }
-  std::sort(folders.begin(), folders.end());
+  const std::vector<std::filesystem::path> folders = scene_folders(scenes_folder, filter);
   for (const auto& folder : folders) {
     BinScene scene = read_scene(folder, ply);
     degrade(scene.cloud, noise_mm / 1000, point_share, static_cast<unsigned>(&folder - folders.data()));
@@ -126,15 +168,7 @@ int main(int argc, char** argv) {
         const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
         if (!result.ok()) return 1;
         for (const PoseHypothesis& p : result->hypotheses) {
-          std::printf(
-              "H %s/%s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res "
-              "%.3f votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
-              scene.name.c_str(), name.c_str(), -2, p.score, p.explained_fraction, p.violated_fraction,
-              1 - p.visible_fraction, p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence,
-              p.explained_area, 1e3 * p.residual, p.votes, p.T_scene_model.translation().x(),
-              p.T_scene_model.translation().y(), p.T_scene_model.translation().z(),
-              Eigen::Quaterniond(p.T_scene_model.linear()).x(), Eigen::Quaterniond(p.T_scene_model.linear()).y(),
-              Eigen::Quaterniond(p.T_scene_model.linear()).z(), Eigen::Quaterniond(p.T_scene_model.linear()).w());
+          print_hypothesis(scene.name + "/" + name, -2, p);
         }
       }
       continue;
@@ -155,29 +189,10 @@ int main(int argc, char** argv) {
     if (per_scene) print(scene.name, {score, {1000 * result->stats.total_seconds}});
     for (std::size_t h = 0; h < result->hypotheses.size() && dump; ++h) {
       const PoseHypothesis& p = result->hypotheses[h];
-      std::printf(
-          "H %s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res %.3f "
-          "votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
-          scene.name.c_str(), verdicts[h], p.score, p.explained_fraction, p.violated_fraction, 1 - p.visible_fraction,
-          p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence, p.explained_area,
-          1e3 * p.residual, p.votes, p.T_scene_model.translation().x(), p.T_scene_model.translation().y(),
-          p.T_scene_model.translation().z(), Eigen::Quaterniond(p.T_scene_model.linear()).x(),
-          Eigen::Quaterniond(p.T_scene_model.linear()).y(), Eigen::Quaterniond(p.T_scene_model.linear()).z(),
-          Eigen::Quaterniond(p.T_scene_model.linear()).w());
+      print_hypothesis(scene.name, verdicts[h], p);
     }
     const DetectStats& s = result->stats;
-    sum.preprocess_seconds += s.preprocess_seconds;
-    sum.vote_seconds += s.vote_seconds;
-    sum.cluster_seconds += s.cluster_seconds;
-    sum.refine_seconds += s.refine_seconds;
-    sum.verify_seconds += s.verify_seconds;
-    sum.rank_seconds += s.rank_seconds;
-    sum.total_seconds += s.total_seconds;
-    sum.start_point_count += s.start_point_count;
-    sum.scene_pair_count += s.scene_pair_count;
-    sum.vote_count += s.vote_count;
-    sum.cluster_count += s.cluster_count;
-    sum.verified_count += s.verified_count;
+    add(sum, s);
   }
   for (const auto& [name, row] : rows) print(name, row);
   if (folders.empty()) return 1;
