@@ -113,6 +113,21 @@ Trained train_all(const std::string& parts_folder, const TrainParams& train_para
   return trained;
 }
 
+/// Searches a scene for every part but its own and prints all that is found.
+bool search_for_wrong_parts(const BinScene& scene, const Trained& trained, const DetectParams& detect_params,
+                            const RunControl& control) {
+  for (const auto& [name, other] : trained) {
+    if (name == scene.part) continue;
+    const Model* const models[] = {&other.first};
+    const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
+    if (!result.ok()) return false;
+    for (const PoseHypothesis& p : result->hypotheses) {
+      print_hypothesis(scene.name + "/" + name, -2, p);
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -133,7 +148,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", control.threads);
   app.add_option("--min-score", detect_params.min_score);
   app.add_option("--pairs", train_params.pairs_per_point);
-  app.add_option("--clusters", detect_params.cluster_limit);
   app.add_option("--share", detect_params.start_point_share);
   std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
                                                      {"observability", PairSelection::kObservability},
@@ -162,15 +176,7 @@ int main(int argc, char** argv) {
     BinScene scene = read_scene(folder, ply);
     degrade(scene.cloud, noise_mm / 1000, point_share, static_cast<unsigned>(&folder - folders.data()));
     if (wrong_parts) {
-      for (const auto& [name, other] : trained) {
-        if (name == scene.part) continue;
-        const Model* const models[] = {&other.first};
-        const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
-        if (!result.ok()) return 1;
-        for (const PoseHypothesis& p : result->hypotheses) {
-          print_hypothesis(scene.name + "/" + name, -2, p);
-        }
-      }
+      if (!search_for_wrong_parts(scene, trained, detect_params, control)) return 1;
       continue;
     }
     const auto& [model, judge] = trained.at(scene.part);
@@ -195,8 +201,7 @@ int main(int argc, char** argv) {
     add(sum, s);
   }
   for (const auto& [name, row] : rows) print(name, row);
-  if (folders.empty()) return 1;
-  if (wrong_parts) return 0;
+  if (folders.empty() || wrong_parts) return folders.empty() ? 1 : 0;
   print("ALL", all);
   const double n = static_cast<double>(folders.size());
   std::printf("mean ms: preprocess %.1f vote %.1f cluster %.1f refine %.1f verify %.1f rank %.1f total %.1f\n",
