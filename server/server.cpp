@@ -149,7 +149,8 @@ void Server::stop() {
   if (!drain_.wait_for_calls(std::chrono::seconds(config_.drain_timeout_seconds))) {
     spdlog::warn("calls still run after {} s; they are cancelled", config_.drain_timeout_seconds);
   }
-  grpc_server_->Shutdown(std::chrono::system_clock::now());
+  // What still runs are watchers of health, which end only with the server; the time is for their NOT_SERVING to leave.
+  grpc_server_->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
   grpc_server_.reset();
 }
 
