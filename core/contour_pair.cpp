@@ -9,6 +9,14 @@ namespace {
 
 constexpr float kTwoPi = 2 * std::numbers::pi_v<float>;
 
+bool makes_pair(const ContourPoint& a, const ContourPoint& b, float shortest, float longest, float flatness) {
+  const Eigen::Vector3f line = b.position - a.position;
+  const float sq_distance = line.squaredNorm();
+  return sq_distance >= shortest * shortest && sq_distance <= longest * longest &&
+         a.normal.dot(b.normal) >= kSameNormalCosine && std::abs(a.normal.dot(line)) <= flatness &&
+         std::abs(b.normal.dot(line)) <= flatness;
+}
+
 }  // namespace
 
 std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPoint& b, float shortest, float longest,

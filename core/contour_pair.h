@@ -29,20 +29,12 @@ struct ContourFrame {
   ContourFeature feature;
 };
 
-/// Whether two contour points make a pair: coplanar and at a fitting distance; see contour_frame().
-inline bool makes_pair(const ContourPoint& a, const ContourPoint& b, float shortest, float longest, float flatness) {
-  constexpr float kSameNormalCosine = 0.9659258F;  // 15 degrees
-  const Eigen::Vector3f line = b.position - a.position;
-  const float sq_distance = line.squaredNorm();
-  return sq_distance >= shortest * shortest && sq_distance <= longest * longest &&
-         a.normal.dot(b.normal) >= kSameNormalCosine && std::abs(a.normal.dot(line)) <= flatness &&
-         std::abs(b.normal.dot(line)) <= flatness;
-}
-
 /// The frame and feature of two contour points; none when their normals differ by more than 15 degrees, when one lies
 /// more than `flatness` off the other's plane, or when their distance is outside [shortest, longest]. Metres.
 std::optional<ContourFrame> contour_frame(const ContourPoint& a, const ContourPoint& b, float shortest, float longest,
                                           float flatness);
+
+inline constexpr float kSameNormalCosine = 0.9659258F;  ///< 15 degrees
 
 /// Lengths of contour pairs, as shares of the diameter.
 inline constexpr float kShortestContourPair = 0.2F;

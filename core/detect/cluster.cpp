@@ -16,6 +16,7 @@ constexpr int kRotationCells = 8;  // cover [-0.8, 0.8]
 
 /// Numbers of a pose cell: centre x, y, z, the quaternion's largest component, and the bins of its other three.
 struct CellOf {
+  static constexpr int kRotationBits = 11;
   Eigen::Array3f origin;
   float inverse_size;
   int bits = 1;  ///< per centre coordinate
@@ -34,15 +35,19 @@ struct CellOf {
   Eigen::Array3f centre_coordinates(const Eigen::Vector3f& centre) const {
     return (centre.array() - origin) * inverse_size;
   }
-  std::uint64_t key(const Eigen::Array3i& cell, int largest, const Eigen::Array3i& rotation) const {
+  /// The part of a key that says where, and the part that says how turned; a key is both.
+  std::uint64_t centre_key(const Eigen::Array3i& cell) const {
     const std::uint64_t limit = (std::uint64_t{1} << bits) - 1;
     std::uint64_t key = 0;
     for (int i = 0; i < 3; ++i) key = key << bits | std::min<std::uint64_t>(limit, std::max(0, cell[i]));
-    key = key << 2 | static_cast<unsigned>(largest);
+    return key << kRotationBits;
+  }
+  static std::uint64_t rotation_key(int largest, const Eigen::Array3i& rotation) {
+    auto key = static_cast<unsigned>(largest);
     for (int i = 0; i < 3; ++i) key = key << 3 | static_cast<unsigned>(std::clamp(rotation[i], 0, kRotationCells - 1));
     return key;
   }
-  int key_bits() const { return 3 * bits + 11; }
+  int key_bits() const { return 3 * bits + kRotationBits; }
 };
 
 /// The quaternion without its largest component, made positive: near-uniform coordinates of a rotation.
@@ -94,8 +99,8 @@ std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cel
   std::vector<KeyedVote> keyed(votes.size());
   for (std::size_t i = 0; i < votes.size(); ++i) {
     const RotationCoordinates rotation(votes[i].q_view_model);
-    keyed[i] = {cell_of.key(cell_of.centre_coordinates(votes[i].centre).cast<int>(), rotation.largest,
-                            rotation.rest.cast<int>()),
+    keyed[i] = {cell_of.centre_key(cell_of.centre_coordinates(votes[i].centre).cast<int>()) |
+                    CellOf::rotation_key(rotation.largest, rotation.rest.cast<int>()),
                 static_cast<std::uint32_t>(i)};
   }
   radix_sort(keyed, cell_of.key_bits());
@@ -119,53 +124,121 @@ PoseCluster mean(const Cell& cell) {
   return {cell.centre / cell.weight, Eigen::Quaternionf(Eigen::Vector4f(cell.quaternion.normalized())), cell.weight};
 }
 
-/// Finds cells by key.
+/// Finds the cells of a centre. They follow each other in a list sorted by key.
 class CellIndex {
  public:
-  explicit CellIndex(const std::vector<Cell>& cells)
-      : cells_(cells), slots_(std::bit_ceil(2 * cells.size()), kEmpty), shift_(64 - std::countr_zero(slots_.size())) {
-    for (std::uint32_t i = 0; i < cells.size(); ++i) {
-      std::size_t slot = first_slot(cells[i].key);
+  explicit CellIndex(const std::vector<Cell>& cells) {
+    keys_.reserve(cells.size());
+    for (const Cell& cell : cells) {
+      if (keys_.empty() || (keys_.back() ^ cell.key) >> CellOf::kRotationBits != 0) {
+        firsts_.push_back(static_cast<std::uint32_t>(keys_.size()));
+      }
+      keys_.push_back(cell.key);
+    }
+    const auto centres = static_cast<std::uint32_t>(firsts_.size());
+    firsts_.push_back(static_cast<std::uint32_t>(keys_.size()));
+    slots_.assign(std::bit_ceil(std::size_t{2} * centres), kEmpty);
+    shift_ = 64 - std::countr_zero(slots_.size());
+    for (std::uint32_t i = 0; i < centres; ++i) {
+      std::size_t slot = first_slot(keys_[firsts_[i]]);
       while (slots_[slot] != kEmpty) slot = (slot + 1) & (slots_.size() - 1);
       slots_[slot] = i;
     }
   }
-  const Cell* find(std::uint64_t key) const {
-    for (std::size_t slot = first_slot(key); slots_[slot] != kEmpty; slot = (slot + 1) & (slots_.size() - 1)) {
-      if (cells_[slots_[slot]].key == key) return &cells_[slots_[slot]];
+
+  /// Calls `use(i)` for each cell i of a centre whose rotation's bins are those of `low_rotation` or one more.
+  template <typename Use>
+  void for_each_near(std::uint64_t centre_key, std::uint64_t low_rotation, Use&& use) const {
+    constexpr std::uint64_t kOneMore = 0b001'001'001;
+    for (std::size_t slot = first_slot(centre_key); slots_[slot] != kEmpty; slot = (slot + 1) & (slots_.size() - 1)) {
+      const std::uint32_t first = firsts_[slots_[slot]], end = firsts_[slots_[slot] + 1];
+      if ((keys_[first] ^ centre_key) >> CellOf::kRotationBits != 0) continue;
+      for (std::uint32_t i = first; i < end; ++i) {
+        if (((keys_[i] - (centre_key | low_rotation)) & ~kOneMore) == 0) use(i);
+      }
+      return;
     }
-    return nullptr;
   }
 
  private:
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFF;
-  std::size_t first_slot(std::uint64_t key) const { return key * 0x9E3779B97F4A7C15ULL >> shift_; }
+  std::size_t first_slot(std::uint64_t key) const {
+    return (key >> CellOf::kRotationBits) * 0x9E3779B97F4A7C15ULL >> shift_;
+  }
 
-  const std::vector<Cell>& cells_;
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::uint32_t> firsts_;  // cell of each centre's first rotation, and the end
   std::vector<std::uint32_t> slots_;
-  int shift_;
+  int shift_ = 0;
 };
 
 /// A cell with those of the 64 cells around its mean (8 of centre, 8 of rotation) that agree with it.
-PoseCluster with_neighbours(const CellIndex& index, const Cell& seed, const CellOf& cell_of,
-                            const ClusterOptions& options) {
-  const PoseCluster own = mean(seed);
+PoseCluster with_neighbours(const std::vector<Cell>& cells, const CellIndex& index, std::uint32_t seed,
+                            const CellOf& cell_of, const ClusterOptions& options) {
+  const PoseCluster own = mean(cells[seed]);
   const RotationCoordinates rotation(own.q_view_model);
   const Eigen::Array3i low_cell = (cell_of.centre_coordinates(own.centre) - 0.5F).cast<int>();
-  const Eigen::Array3i low_rotation = (rotation.rest - 0.5F).cast<int>();
-  Cell sum = seed;
-  for (int i = 0; i < 64; ++i) {
+  const std::uint64_t low_rotation = CellOf::rotation_key(rotation.largest, (rotation.rest - 0.5F).cast<int>());
+  const float half_angle_cosine = std::cos(0.5F * options.angle);
+  Cell sum = cells[seed];
+  for (int i = 0; i < 8; ++i) {
     const Eigen::Array3i cell = low_cell + Eigen::Array3i(i & 1, i >> 1 & 1, i >> 2 & 1);
-    const Eigen::Array3i turn = low_rotation + Eigen::Array3i(i >> 3 & 1, i >> 4 & 1, i >> 5 & 1);
-    const std::uint64_t key = cell_of.key(cell, rotation.largest, turn);
-    if (key == seed.key) continue;
-    const Cell* found = index.find(key);
-    if (found == nullptr) continue;
-    const PoseCluster other = mean(*found);
-    if (!same_pose(own, other, options.radius, std::cos(0.5F * options.angle))) continue;
-    add(sum, other.votes, other.centre, other.q_view_model.coeffs());
+    index.for_each_near(cell_of.centre_key(cell), low_rotation, [&](std::uint32_t found) {
+      if (found == seed) return;
+      const PoseCluster other = mean(cells[found]);
+      if (!same_pose(own, other, options.radius, half_angle_cosine)) return;
+      add(sum, other.votes, other.centre, other.q_view_model.coeffs());
+    });
   }
   return mean(sum);
+}
+
+/// Clusters found by place. A cluster lies in the buckets of its own cell and of the 8 around it, x and y wrapped, so
+/// that one bucket holds all that lie within a cell's side of a place, and some that don't.
+class ClusterGrid {
+ public:
+  explicit ClusterGrid(float side) : inverse_(1 / side) {}
+
+  const std::vector<std::uint32_t>& around(const Eigen::Vector3f& place) const {
+    const Eigen::Array2i c = cell(place);
+    return buckets_[bucket(c.x(), c.y())];
+  }
+  void insert(const Eigen::Vector3f& place, std::uint32_t index) {
+    const Eigen::Array2i c = cell(place);
+    for (int i = 0; i < 9; ++i) buckets_[bucket(c.x() + i % 3 - 1, c.y() + i / 3 - 1)].push_back(index);
+  }
+
+ private:
+  static constexpr int kSide = 32;
+  Eigen::Array2i cell(const Eigen::Vector3f& p) const {
+    return (p.head<2>().array() * inverse_).floor().max(-1e6F).min(1e6F).cast<int>();
+  }
+  static int bucket(int x, int y) { return (y & (kSide - 1)) * kSide + (x & (kSide - 1)); }
+
+  float inverse_;
+  std::array<std::vector<std::uint32_t>, kSide * kSide> buckets_;
+};
+
+/// The strongest clusters, without those that repeat a stronger one or have too many of them around.
+std::vector<PoseCluster> thin_out(const std::vector<PoseCluster>& clusters, const ClusterOptions& options) {
+  std::vector<PoseCluster> kept;
+  ClusterGrid grid(options.neighbourhood);
+  for (const PoseCluster& candidate : clusters) {
+    if (static_cast<int>(kept.size()) >= options.most) break;
+    int around = 0;
+    bool repeats = false;
+    for (const std::uint32_t i : grid.around(candidate.centre)) {
+      const PoseCluster& other = kept[i];
+      if ((other.centre - candidate.centre).squaredNorm() > options.neighbourhood * options.neighbourhood) continue;
+      ++around;
+      repeats = repeats || same_pose(other, candidate, options.radius, std::cos(0.5F * options.angle));
+      if (repeats || around >= options.most_per_neighbourhood) break;
+    }
+    if (repeats || around >= options.most_per_neighbourhood) continue;
+    grid.insert(candidate.centre, static_cast<std::uint32_t>(kept.size()));
+    kept.push_back(candidate);
+  }
+  return kept;
 }
 
 }  // namespace
@@ -185,24 +258,12 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   const CellIndex index(cells);
   std::vector<PoseCluster> merged;
   for (std::size_t i = 0; i < seed_count; ++i) {
-    merged.push_back(with_neighbours(index, cells[seeds[i]], cell_of, options));
+    merged.push_back(with_neighbours(cells, index, seeds[i], cell_of, options));
   }
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });
 
-  std::vector<PoseCluster> kept;
-  for (const PoseCluster& candidate : merged) {
-    if (static_cast<int>(kept.size()) >= options.most) break;
-    int around = 0;
-    bool repeats = false;
-    for (const PoseCluster& other : kept) {
-      if ((other.centre - candidate.centre).squaredNorm() > options.neighbourhood * options.neighbourhood) continue;
-      ++around;
-      repeats = repeats || same_pose(other, candidate, options.radius, std::cos(0.5F * options.angle));
-    }
-    if (!repeats && around < options.most_per_neighbourhood) kept.push_back(candidate);
-  }
-  return kept;
+  return thin_out(merged, options);
 }
 
 }  // namespace binpose

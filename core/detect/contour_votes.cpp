@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/detect/point_block.h"
 #include "core/parallel.h"
 
 namespace binpose {
@@ -10,52 +11,100 @@ namespace {
 constexpr int kBlock = 4;  // pixels: one contour point of each block takes part
 constexpr int kPointsPerTask = 64;
 
-/// Contour points thinned by image block, with their outward directions turned into the tangent plane.
+/// The scene's contour points thinned by image block, row by row, their outward directions turned into the tangent
+/// plane.
 struct ContourGrid {
-  int columns = 0, rows = 0;
+  int columns, rows;
   std::vector<ContourPoint> points;
-  std::vector<Eigen::Vector2i> block;  // of each point
-  std::vector<int> of_block;           // index into points, or -1
+  std::vector<int> block;  ///< of each point
+  std::vector<int> first;  ///< per block: the first point in it or after it
+  std::vector<float> px, py, pz, nx, ny,
+      nz;  ///< positions and normals by component, with room to read lanes past the end
 
   explicit ContourGrid(const DepthMap& map) : columns(map.width / kBlock + 1), rows(map.height / kBlock + 1) {
-    of_block.assign(static_cast<std::size_t>(columns) * rows, -1);
-    for (ContourPoint contour : map.contours) {
-      const int pixel = map.pixel_of(contour.position);
-      if (pixel < 0 || map.background[pixel]) continue;
-      const Eigen::Vector2i at(pixel % map.width / kBlock, pixel / map.width / kBlock);
-      int& slot = of_block[static_cast<std::size_t>(at.y()) * columns + at.x()];
-      const Eigen::Vector3f in_plane = contour.outward - contour.normal * contour.normal.dot(contour.outward);
-      if (slot >= 0 || in_plane.norm() < 0.5F) continue;
-      contour.outward = in_plane.normalized();
-      slot = static_cast<int>(points.size());
-      points.push_back(contour);
-      block.push_back(at);
+    std::vector<int> contour_of(static_cast<std::size_t>(columns) * rows, -1);
+    for (std::size_t i = 0; i < map.contours.size(); ++i) {
+      const int pixel = map.pixel_of(map.contours[i].position);
+      if (pixel < 0 || map.background[pixel] || in_plane(map.contours[i]).norm() < 0.5F) continue;
+      int& slot =
+          contour_of[static_cast<std::size_t>(pixel / map.width / kBlock) * columns + pixel % map.width / kBlock];
+      if (slot < 0) slot = static_cast<int>(i);
     }
+    for (std::size_t i = 0; i < contour_of.size(); ++i) {
+      first.push_back(static_cast<int>(points.size()));
+      if (contour_of[i] >= 0) add(map.contours[contour_of[i]], static_cast<int>(i));
+    }
+    first.push_back(static_cast<int>(points.size()));
+    for (std::vector<float>* component : {&px, &py, &pz, &nx, &ny, &nz}) component->resize(points.size() + kLanes);
+  }
+
+ private:
+  static Eigen::Vector3f in_plane(const ContourPoint& c) { return c.outward - c.normal * c.normal.dot(c.outward); }
+
+  void add(ContourPoint contour, int at) {
+    contour.outward = in_plane(contour).normalized();
+    points.push_back(contour);
+    block.push_back(at);
+    px.push_back(contour.position.x());
+    py.push_back(contour.position.y());
+    pz.push_back(contour.position.z());
+    nx.push_back(contour.normal.x());
+    ny.push_back(contour.normal.y());
+    nz.push_back(contour.normal.z());
   }
 };
 
-void match_point(const ContourGrid& grid, int a, int reach, const Model& model, Votes& out) {
-  const auto diameter = static_cast<float>(model.diameter);
-  const float shortest = kShortestContourPair * diameter, longest = kLongestContourPair * diameter,
-              flatness = kContourFlatness * diameter;
-  const Eigen::Vector2i at = grid.block[a];
-  for (int row = at.y(); row <= std::min(grid.rows - 1, at.y() + reach); ++row) {
-    // Each pair once: the rest of this row, then the rows below.
-    const int first = row == at.y() ? at.x() + 1 : std::max(0, at.x() - reach);
-    for (int column = first; column <= std::min(grid.columns - 1, at.x() + reach); ++column) {
-      const int b = grid.of_block[static_cast<std::size_t>(row) * grid.columns + column];
-      if (b < 0) continue;
-      if (!makes_pair(grid.points[a], grid.points[b], shortest, longest, flatness)) continue;
-      const std::optional<ContourFrame> frame =
-          contour_frame(grid.points[a], grid.points[b], shortest, longest, flatness);
-      if (!frame) continue;
-      ++out.scene_pairs;
-      const Eigen::Quaternionf q_view_pair(frame->T_outer_pair.linear());
-      model.contour_table.for_each_match(frame->feature, [&](const ContourTable::Vote& vote) {
-        out.votes.push_back(
-            {frame->T_outer_pair * vote.centre_in_pair, vote.weight, q_view_pair * vote.rotation_pair_model});
-      });
+/// Limits of a pair in metres; see contour_frame().
+struct PairLimits {
+  float shortest, longest, flatness;
+};
+
+/// Adds to `found` which points of [first, last) may make a pair with point `a`: contour_frame()'s test, eight at a
+/// time.
+BINPOSE_VECTORISED
+void find_partners(const ContourGrid& grid, int a, int first, int last, const PairLimits& limits,
+                   std::vector<int>& found) {
+  const Eigen::Vector3f &p = grid.points[a].position, &n = grid.points[a].normal;
+  for (int b = first; b < last; b += kLanes) {
+    const LanePoints line = {load_lanes(&grid.px[b]) - p.x(), load_lanes(&grid.py[b]) - p.y(),
+                             load_lanes(&grid.pz[b]) - p.z()};
+    const LanePoints normal = {load_lanes(&grid.nx[b]), load_lanes(&grid.ny[b]), load_lanes(&grid.nz[b])};
+    const Lanes sq_distance = dot(line, line);
+    const Lanes off_a = magnitude(line.x * n.x() + line.y * n.y() + line.z * n.z());
+    const Lanes cosine = normal.x * n.x() + normal.y * n.y() + normal.z * n.z();
+    const LaneInts pairs = (sq_distance >= limits.shortest * limits.shortest) &
+                           (sq_distance <= limits.longest * limits.longest) & (off_a <= limits.flatness) &
+                           (magnitude(dot(line, normal)) <= limits.flatness) & (cosine >= kSameNormalCosine);
+    for (int i = 0; i < std::min(kLanes, last - b); ++i) {
+      if (pairs[i] != 0) found.push_back(b + i);
     }
+  }
+}
+
+/// Votes of all pairs of point `a` with later points at most `reach` blocks away.
+void match_point(const ContourGrid& grid, int a, int reach, const Model& model, std::vector<int>& partners,
+                 Votes& out) {
+  const auto diameter = static_cast<float>(model.diameter);
+  const PairLimits limits = {kShortestContourPair * diameter, kLongestContourPair * diameter,
+                             kContourFlatness * diameter};
+  const int at_row = grid.block[a] / grid.columns, at_column = grid.block[a] % grid.columns;
+  partners.clear();
+  for (int row = at_row; row <= std::min(grid.rows - 1, at_row + reach); ++row) {
+    const int start = row * grid.columns;
+    const int first = row == at_row ? a + 1 : grid.first[start + std::max(0, at_column - reach)];
+    const int last = grid.first[start + std::min(grid.columns - 1, at_column + reach) + 1];
+    find_partners(grid, a, first, last, limits, partners);
+  }
+  for (const int b : partners) {
+    const std::optional<ContourFrame> frame =
+        contour_frame(grid.points[a], grid.points[b], limits.shortest, limits.longest, limits.flatness);
+    if (!frame) continue;
+    ++out.scene_pairs;
+    const Eigen::Quaternionf q_view_pair(frame->T_outer_pair.linear());
+    model.contour_table.for_each_match(frame->feature, [&](const ContourTable::Vote& vote) {
+      out.votes.push_back(
+          {frame->T_outer_pair * vote.centre_in_pair, vote.weight, q_view_pair * vote.rotation_pair_model});
+    });
   }
 }
 
@@ -67,11 +116,12 @@ Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& c
   const int tasks = (count + kPointsPerTask - 1) / kPointsPerTask;
   std::vector<Votes> parts(tasks);
   parallel_for(tasks, control.threads, [&](int task) {
+    std::vector<int> partners;
     for (int a = task * kPointsPerTask; a < std::min(count, (task + 1) * kPointsPerTask); ++a) {
       if (control.interrupted()) return;
       const double span = kLongestContourPair * model.diameter;
       const double pixels = span * map.focal / std::max(1e-6, grid.points[a].position.z() - span);
-      match_point(grid, a, static_cast<int>(pixels / kBlock) + 1, model, parts[task]);
+      match_point(grid, a, static_cast<int>(std::min(pixels / kBlock, 1e6)) + 1, model, partners, parts[task]);
     }
   });
   return concatenate(parts);

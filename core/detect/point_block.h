@@ -42,6 +42,18 @@ struct LaneBuffer {
   }
 };
 
+/// The pixels that points fall on, or -1.
+[[gnu::always_inline]] inline LaneInts pixels_of(const DepthMap& map, const LanePoints& p) {
+  const Lanes scale = map.focal / p.z;
+  const Lanes u = p.x * scale + (map.cx + 0.5F), v = p.y * scale + (map.cy + 0.5F);
+  const LaneInts inside =
+      (p.z > 0) & (u >= 0) & (v >= 0) & (u < static_cast<float>(map.width)) & (v < static_cast<float>(map.height));
+  const Lanes zero = {};
+  const LaneInts pixel = __builtin_convertvector(inside ? v : zero, LaneInts) * map.width +
+                         __builtin_convertvector(inside ? u : zero, LaneInts);
+  return inside ? pixel : LaneInts{} - 1;
+}
+
 /// Surface points under a pose, and what the sensor measured where they fall; eight at a time.
 struct PointBlock {
   LanePoints point, normal;              ///< of the model, view frame; lanes without a point have z = -1
@@ -67,23 +79,18 @@ struct PointBlock {
 
   /// Finds the pixel of each point and takes what was measured there.
   [[gnu::always_inline]] void look_up(const DepthMap& map) {
-    const Lanes scale = map.focal / point.z;
-    const Lanes u = point.x * scale + (map.cx + 0.5F), v = point.y * scale + (map.cy + 0.5F);
-    const LaneInts inside = (point.z > 0) & (u >= 0) & (v >= 0) & (u < static_cast<float>(map.width)) &
-                            (v < static_cast<float>(map.height));
-    const Lanes zero = {};
-    pixel = __builtin_convertvector(inside ? v : zero, LaneInts) * map.width +
-            __builtin_convertvector(inside ? u : zero, LaneInts);
+    pixel = pixels_of(map, point);
     LaneBuffer positions, normals;
     for (int i = 0; i < kLanes; ++i) {
-      positions.set(i, map.points[pixel[i]]);
-      normals.set(i, map.normals[pixel[i]]);
+      const int at = std::max(0, pixel[i]);
+      positions.set(i, map.points[at]);
+      normals.set(i, map.normals[at]);
     }
     scene_point = positions.load();
     scene_normal = normals.load();
-    scene_point.z = inside ? scene_point.z : zero;
-    scene_normal.z = inside ? scene_normal.z : zero;
-    pixel = inside ? pixel : LaneInts{} - 1;
+    const Lanes zero = {};
+    scene_point.z = pixel >= 0 ? scene_point.z : zero;
+    scene_normal.z = pixel >= 0 ? scene_normal.z : zero;
   }
 };
 

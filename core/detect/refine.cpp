@@ -101,8 +101,10 @@ const ContourPoint* matching_contour(const DepthMap& map, const Eigen::Vector3f&
 /// Draws each outline point to where the scene's surface ends. Planes leave a flat part free to slide; its rim does
 /// not.
 void add_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
-                 const Eigen::Vector3f& pivot, float gate, float weight, NormalEquations& equations) {
-  for (const ContourPoint& point : outline) {
+                 const Eigen::Vector3f& pivot, float gate, int stride, NormalEquations& equations) {
+  const float weight = kOutlineWeight * static_cast<float>(stride);
+  for (std::size_t i = 0; i < outline.size(); i += stride) {
+    const ContourPoint& point = outline[i];
     const Eigen::Vector3f p = T_view_model * point.position;
     if (!(p.z() > 0)) continue;
     const Eigen::Vector3f outward = T_view_model.linear() * point.outward;
@@ -144,7 +146,7 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
     const Eigen::Vector3f pivot = T * model.centre.cast<float>();
     NormalEquations equations;
     add_surface(map, model, points, T, pivot, gate, equations);
-    add_outline(map, model.outlines[viewpoint], T, pivot, gate, kOutlineWeight, equations);
+    add_outline(map, model.outlines[viewpoint], T, pivot, gate, options.outline_stride, equations);
     if (equations.rows < kFewestCorrespondences) break;
     const Eigen::Matrix<float, 6, 1> step = solve(equations, radius);
     if (!step.allFinite()) break;

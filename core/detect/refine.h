@@ -11,6 +11,7 @@ struct RefineOptions {
   float last_gate = 0;   ///< ... and at the end
   int iterations = 6;
   int most_points = 200;
+  int outline_stride = 1;  ///< every n-th outline point counts, n times
 };
 
 /// Projective point-to-plane ICP: each visible model point is drawn to the plane of the pixel that it falls on

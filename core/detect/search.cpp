@@ -27,13 +27,15 @@ constexpr float kLastGate = 0.025F;
 constexpr int kCoarsePoints = 80;
 constexpr int kCoarseOutlineStride = 3;
 constexpr int kClustersPerNeighbourhood = 20;
-constexpr int kRefinedPerNeighbourhood = 4;
-constexpr int kMostRefined = 200;
+constexpr int kRefinedPerNeighbourhood = 8;
+constexpr int kMostRefined = 300;
 constexpr int kFirstIterations = 4;
 constexpr int kFirstPoints = 100;
+constexpr int kFirstOutlineStride = 3;
 constexpr int kMiddlePoints = 300;
 constexpr int kFinalistsPerNeighbourhood = 6;
 constexpr int kMostFinalists = 150;
+constexpr float kRepeat = 0.02F;
 constexpr float kFinestGate = 0.015F;
 constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
@@ -53,9 +55,17 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
   });
 }
 
-/// The best candidates of each neighbourhood, best first.
+/// Whether two poses are the same but for what refinement leaves.
+bool same_pose(const Candidate& a, const Candidate& b, const Eigen::Vector3f& centre, float distance) {
+  constexpr float kLeastTrace = 2.985F;  // 7 degrees
+  return (a.T_view_model * centre - b.T_view_model * centre).squaredNorm() < distance * distance &&
+         a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
+}
+
+/// The best candidates of each neighbourhood, best first, without those that repeat a better one within `repeat`
+/// metres.
 std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, const Model& model, int per_place,
-                                          int most) {
+                                          int most, float repeat) {
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); });
   const Eigen::Vector3f centre = model.centre.cast<float>();
@@ -64,6 +74,10 @@ std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, con
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(kept.size()) >= most) break;
     const Eigen::Vector3f place = candidate.T_view_model * centre;
+    if (std::any_of(kept.begin(), kept.end(),
+                    [&](const Candidate& other) { return same_pose(candidate, other, centre, repeat); })) {
+      continue;
+    }
     const auto around = std::count_if(kept.begin(), kept.end(), [&](const Candidate& other) {
       return (other.T_view_model * centre - place).squaredNorm() < reach * reach;
     });
@@ -113,7 +127,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
-  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined);
+  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined, 0);
 }
 
 /// Refines each candidate and judges it anew.
@@ -141,14 +155,17 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   refinement.last_gate = kLastGate * diameter;
   refinement.iterations = kFirstIterations;
   refinement.most_points = kFirstPoints;
+  refinement.outline_stride = kFirstOutlineStride;
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
-  candidates = best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists);
+  candidates =
+      best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists, kRepeat * diameter);
   refinement.first_gate = kLastGate * diameter;
   refinement.last_gate = kFinestGate * diameter;
   refinement.iterations = kFinestIterations;
   refinement.most_points = kFinestPoints;
+  refinement.outline_stride = 1;
   refine_all(map, model, refinement, final_verification(map, model), control, candidates, stats);
   return candidates;
 }
@@ -164,7 +181,7 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
     candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
   }
   stats.verified_count += candidates.size();
-  return best_of_each_place(std::move(candidates), model, 1, kMostFinalists);
+  return best_of_each_place(std::move(candidates), model, 1, kMostFinalists, 0);
 }
 
 }  // namespace

@@ -9,58 +9,88 @@ namespace binpose {
 namespace {
 
 // See Evidence::score().
-constexpr float kViolationPenalty = 2.5F;
+constexpr float kViolationPenalty = 4;
 constexpr float kExcuse = 0.75F;
 constexpr float kMisfitPenalty = 0.75F;
-constexpr float kLargeArea = 0.8F;
-constexpr float kSizeExponent = 0.2F;
+constexpr float kLargeArea = 0.75F;
+constexpr float kSizeExponent = 0.45F;
+constexpr float kOutlinePenalty = 1.3F;
 /// What the sampling of the model leaves as residual even without noise, diameters.
 constexpr float kRelativeFloor = 0.0012F;
 /// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
 /// may all be hidden, or have nothing measured beyond it.
-constexpr float kOutlineTrust = 0.04F, kOutlineDoubt = 0.01F;
+constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;
 /// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
 constexpr float kSteepest = 0.25882F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
 constexpr float kOutside = 2.0F;
 constexpr float kInside = 1.0F;
 
-/// How far the scene lies behind the surface of an outline point, carried on a little along `outward`; metres, NaN
-/// where nothing was measured. At a rounded side the tangent plane runs along the ray: it is carried on at most at
-/// `steepest`.
-float depth_behind(const DepthMap& map, const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
-                   const Eigen::Vector3f& outward, float distance, float steepest) {
-  const Eigen::Vector3f q = p + distance * outward;
-  const int pixel = q.z() > 0 ? map.pixel_of(q) : -1;
-  if (pixel < 0 || !map.measured(pixel)) return NAN;
-  const float slope = std::clamp(normal.dot(outward) / std::max(-normal.z(), 0.05F), -steepest, steepest);
-  return (map.points[pixel].z() - p.z() - slope * distance) / std::sqrt(1 + slope * slope);
-}
+/// Outline points under a pose, eight at a time.
+struct OutlineBlock {
+  LanePoints point, normal, outward;
+
+  /// Takes `count` points, `stride` apart; the other lanes get z = -1.
+  [[gnu::always_inline]] void load(const ContourPoint* source, int count, int stride,
+                                   const Eigen::Isometry3f& T_view_model) {
+    LaneBuffer positions, normals, outwards;
+    for (int i = 0; i < kLanes; ++i) {
+      const ContourPoint& contour = source[i < count ? i * stride : 0];
+      positions.set(i, contour.position);
+      normals.set(i, contour.normal);
+      outwards.set(i, contour.outward);
+    }
+    const Eigen::Vector3f t = T_view_model.translation();
+    point = rotate(T_view_model, positions.load());
+    point = {point.x + t.x(), point.y + t.y(), point.z + t.z()};
+    normal = rotate(T_view_model, normals.load());
+    outward = rotate(T_view_model, outwards.load());
+    for (int i = count; i < kLanes; ++i) point.z[i] = -1;
+  }
+
+  /// How far the scene lies behind the surface carried on by `distance` along `outward`, metres; `measured` says where
+  /// that is known. At a rounded side the tangent plane runs along the ray: it is carried on at most at `steepest`.
+  [[gnu::always_inline]] Lanes depth_behind(const DepthMap& map, float distance, float steepest,
+                                            LaneInts& measured) const {
+    const LanePoints q = {point.x + distance * outward.x, point.y + distance * outward.y,
+                          point.z + distance * outward.z};
+    const LaneInts pixel = pixels_of(map, q);
+    Lanes depth = {};
+    for (int i = 0; i < kLanes; ++i) depth[i] = map.points[std::max(0, pixel[i])].z();
+    measured = (pixel >= 0) & (depth > 0) & (point.z > 0);
+    const Lanes zero = {}, one = zero + 1;
+    const Lanes towards = -normal.z > 0.05F ? -normal.z : zero + 0.05F;
+    Lanes slope = dot(normal, outward) / towards;
+    slope = slope > steepest ? zero + steepest : slope;
+    slope = slope < -steepest ? zero - steepest : slope;
+    return (depth - point.z - slope * distance) / root(one + slope * slope);
+  }
+};
 
 /// Whether the scene's surface ends where the model's does.
+BINPOSE_VECTORISED
 void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
                    const VerifyOptions& options, Evidence& evidence) {
-  int confirmed = 0, contradicted = 0;
-  for (std::size_t i = 0; i < outline.size(); i += options.outline_stride) {
-    const ContourPoint& contour = outline[i];
-    const Eigen::Vector3f p = T_view_model * contour.position;
-    const Eigen::Vector3f normal = T_view_model.linear() * contour.normal;
-    const Eigen::Vector3f outward = T_view_model.linear() * contour.outward;
-    const float inside = depth_behind(map, p, normal, outward, -kInside * map.pixel_size, 5);
-    if (inside < -options.tolerance) continue;  // hidden
-    const float outside = depth_behind(map, p, normal, outward, kOutside * map.pixel_size, 1);
-    if (inside > options.tolerance) {
-      ++contradicted;
-    } else if (outside > options.tolerance) {
-      ++confirmed;
-    } else if (outside >= -options.tolerance) {
-      ++contradicted;
-    }
+  LaneInts confirmed = {}, contradicted = {};
+  const auto stride = static_cast<std::size_t>(options.outline_stride);
+  OutlineBlock block;
+  for (std::size_t first = 0; first < outline.size(); first += kLanes * stride) {
+    const std::size_t left = (outline.size() - first + stride - 1) / stride;
+    block.load(&outline[first], static_cast<int>(std::min<std::size_t>(kLanes, left)), options.outline_stride,
+               T_view_model);
+    LaneInts known_inside, known_outside;
+    const Lanes inside = block.depth_behind(map, -kInside * map.pixel_size, 5, known_inside);
+    const Lanes outside = block.depth_behind(map, kOutside * map.pixel_size, 1, known_outside);
+    const LaneInts missing = known_inside & (inside > options.tolerance);
+    const LaneInts hidden = known_inside & (inside < -options.tolerance);
+    const LaneInts judged = known_outside & ~hidden & ~missing;
+    confirmed -= judged & (outside > options.tolerance);
+    contradicted -= missing | (judged & (magnitude(outside) <= options.tolerance));
   }
   const float scale =
       static_cast<float>(options.outline_stride) / static_cast<float>(std::max<std::size_t>(1, outline.size()));
-  evidence.outline_confirmed = scale * static_cast<float>(confirmed);
-  evidence.outline_contradicted = scale * static_cast<float>(contradicted);
+  evidence.outline_confirmed = scale * static_cast<float>(sum_of(confirmed));
+  evidence.outline_contradicted = scale * static_cast<float>(sum_of(contradicted));
 }
 
 /// 1 for the points of a block whose pixel is still there to be explained, 0 for the others.
@@ -130,7 +160,7 @@ constexpr std::size_t kAlignedPoints = 500;
 
 float Evidence::score() const {
   const float surface = (explained - kViolationPenalty * violated) / (1 - kExcuse * occluded);
-  const float right = outline_confirmed + kOutlineTrust, wrong = outline_contradicted + kOutlineDoubt;
+  const float right = outline_confirmed + kOutlineTrust, wrong = kOutlinePenalty * outline_contradicted + kOutlineDoubt;
   const float outline = right / (right + wrong);
   const float fit = std::exp(-kMisfitPenalty * std::max(0.0F, relative_residual - 1));
   const float size = std::pow(std::min(1.0F, area / kLargeArea), kSizeExponent);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/lanes.h"
 #include "core/parallel.h"
 #include "core/train/vector_pairs.h"
 
@@ -11,16 +12,16 @@ namespace {
 
 constexpr int kStartsPerTask = 32;
 
-using Lanes = std::int16_t __attribute__((vector_size(2 * PairTable::kBlock)));
+using NormalLanes = std::int16_t __attribute__((vector_size(2 * PairTable::kBlock)));
 
 /// Bit i is set when all three normals of pair i agree with the scene's: dot products at least `least`.
 unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9], std::int16_t least) {
-  Lanes agree = {};
+  NormalLanes agree = {};
   agree = ~agree;
   for (int k = 0; k < 3; ++k) {
-    Lanes dot = {};
+    NormalLanes dot = {};
     for (int c = 0; c < 3; ++c) {
-      Lanes component;
+      NormalLanes component;
       __builtin_memcpy(&component, block.normals[3 * k + c], sizeof(component));
       dot += component * scene[3 * k + c];
     }
@@ -35,15 +36,40 @@ unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9],
   return bits;
 }
 
-/// Scene points at a pair's length from P.
+/// Scene points at a pair's length from P, and the directions to them.
 struct Ring {
   std::vector<int> points;
-  std::vector<Eigen::Vector3f> directions;
+  std::vector<float> x, y, z;  ///< with room to read lanes past the end
+
   void clear() {
     points.clear();
-    directions.clear();
+    for (std::vector<float>* component : {&x, &y, &z}) component->clear();
+  }
+  void add(int point, const Eigen::Vector3f& direction) {
+    points.push_back(point);
+    x.push_back(direction.x());
+    y.push_back(direction.y());
+    z.push_back(direction.z());
+  }
+  void pad() {
+    for (std::vector<float>* component : {&x, &y, &z}) component->resize(points.size() + kLanes);
   }
 };
+
+/// Sets `found` to the points of a ring at a right angle to a direction.
+BINPOSE_VECTORISED
+void find_at_right_angle(const Ring& ring, float x, float y, float z, std::vector<int>& found) {
+  found.clear();
+  const int count = static_cast<int>(ring.points.size());
+  for (int first = 0; first < count; first += kLanes) {
+    const Lanes cosine =
+        load_lanes(&ring.x[first]) * x + load_lanes(&ring.y[first]) * y + load_lanes(&ring.z[first]) * z;
+    const LaneInts right = magnitude(cosine) <= kRightAngleCosine;
+    for (int i = 0; i < std::min(kLanes, count - first); ++i) {
+      if (right[i] != 0) found.push_back(ring.points[first + i]);
+    }
+  }
+}
 
 /// Forms and matches the pairs of one start point after the other.
 class PairMatcher {
@@ -63,10 +89,8 @@ class PairMatcher {
     for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
       const Ring &q1s = rings_[2 * scale], &q2s = rings_[2 * scale + 1];
       for (std::size_t a = 0; a < q1s.points.size(); ++a) {
-        for (std::size_t b = 0; b < q2s.points.size(); ++b) {
-          if (std::abs(q1s.directions[a].dot(q2s.directions[b])) > kRightAngleCosine) continue;
-          match_pair(static_cast<int>(scale), start, q1s.points[a], q2s.points[b], out);
-        }
+        find_at_right_angle(q2s, q1s.x[a], q1s.y[a], q1s.z[a], partners_);
+        for (const int q2 : partners_) match_pair(static_cast<int>(scale), start, q1s.points[a], q2, out);
       }
     }
   }
@@ -87,6 +111,7 @@ class PairMatcher {
         if (index >= 0 && index != start) sort_into_rings(index, scene_.points[index].position - p);
       }
     }
+    for (Ring& ring : rings_) ring.pad();
   }
 
   void sort_into_rings(int index, const Eigen::Vector3f& offset) {
@@ -96,14 +121,9 @@ class PairMatcher {
     const double relative = distance / model_.diameter;
     for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
       const PairLengths& lengths = model_.params.pair_lengths[scale];
-      if (std::abs(relative - lengths.relative_q1) <= tolerance) add(rings_[2 * scale], index, offset / distance);
-      if (std::abs(relative - lengths.relative_q2) <= tolerance) add(rings_[2 * scale + 1], index, offset / distance);
+      if (std::abs(relative - lengths.relative_q1) <= tolerance) rings_[2 * scale].add(index, offset / distance);
+      if (std::abs(relative - lengths.relative_q2) <= tolerance) rings_[2 * scale + 1].add(index, offset / distance);
     }
-  }
-
-  static void add(Ring& ring, int index, const Eigen::Vector3f& direction) {
-    ring.points.push_back(index);
-    ring.directions.push_back(direction);
   }
 
   void match_pair(int scale, int p, int q1, int q2, Votes& out) {
@@ -133,7 +153,8 @@ class PairMatcher {
   const ScenePoints& scene_;
   const DepthMap& map_;
   const Model& model_;
-  std::vector<Ring> rings_;  // q1 and q2 of each scale
+  std::vector<Ring> rings_;    // q1 and q2 of each scale
+  std::vector<int> partners_;  // of the Q1 at hand
   double longest_ = 0;
   std::int16_t least_ = 0;
 };

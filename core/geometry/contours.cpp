@@ -24,6 +24,17 @@ bool ends(const DepthMap& map, int u, int v, const int (&direction)[2], float st
   return unmeasured == Unmeasured::kFar;
 }
 
+/// Whether the surface at a pixel off the image's border goes on in all directions: the common case, told fast.
+bool goes_on(const DepthMap& map, int i, float step) {
+  const Eigen::Vector3f& n = map.normals[i];
+  const float least = n.dot(map.points[i]) - step;
+  for (const auto& direction : kDirections) {
+    const Eigen::Vector3f& p = map.points[i + direction[1] * map.width + direction[0]];
+    if (!(p.z() > 0) || n.dot(p) < least) return false;
+  }
+  return true;
+}
+
 /// Where the surface at a pixel ends: the mean of the directions in which it does, zero if it goes on.
 Eigen::Vector2f outward_at(const DepthMap& map, int u, int v, float step, Unmeasured unmeasured) {
   Eigen::Vector2f outward = Eigen::Vector2f::Zero();
@@ -42,7 +53,10 @@ void find_contours(DepthMap& map, float step, Unmeasured unmeasured, int threads
   std::vector<Eigen::Vector2f> outward(map.points.size(), Eigen::Vector2f::Zero());
   parallel_for(map.height, threads, [&](int v) {
     for (int u = 0; u < map.width; ++u) {
-      if (map.has_normal(v * map.width + u)) outward[v * map.width + u] = outward_at(map, u, v, step, unmeasured);
+      const int i = v * map.width + u;
+      if (!map.has_normal(i)) continue;
+      const bool inside = u > 0 && v > 0 && u < map.width - 1 && v < map.height - 1;
+      if (!inside || !goes_on(map, i, step)) outward[i] = outward_at(map, u, v, step, unmeasured);
     }
   });
   map.contours.clear();

@@ -11,6 +11,7 @@ namespace {
 constexpr double kMostPixels = 4e6;
 /// Points farther than this off the viewing direction are left out: tan 72 degrees.
 constexpr float kWidestTangent = 3;
+constexpr std::size_t kEnoughForDirection = 20000;  // points
 
 absl::Status check_cloud(const PointCloud& cloud) {
   const std::size_t count = static_cast<std::size_t>(cloud.width) * cloud.height;
@@ -27,6 +28,16 @@ absl::Status check_cloud(const PointCloud& cloud) {
     return absl::InvalidArgumentError("cloud sensor_position is not a finite number.");
   }
   return absl::OkStatus();
+}
+
+/// Sum of the unit directions of every n-th point that was measured.
+Eigen::Vector3d viewing_direction(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& sensor,
+                                  std::size_t step) {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < points.size(); i += step) {
+    if (points[i].allFinite() && points[i] != sensor) direction += (points[i] - sensor).normalized().cast<double>();
+  }
+  return direction;
 }
 
 /// The box of x/z and y/z that all points fall into.
@@ -109,10 +120,8 @@ void fill_specks(DepthMap& map) {
 absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
   if (absl::Status status = check_cloud(cloud); !status.ok()) return status;
   const Eigen::Vector3f sensor = cloud.sensor_position.cast<float>();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3f& p : cloud.points) {
-    if (p.allFinite() && p != sensor) direction += (p - sensor).normalized().cast<double>();
-  }
+  Eigen::Vector3d direction = viewing_direction(cloud.points, sensor, 1 + cloud.points.size() / kEnoughForDirection);
+  if (!(direction.norm() > 0)) direction = viewing_direction(cloud.points, sensor, 1);
   if (!(direction.norm() > 0)) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "cloud has no measurement among its %d points; at least one must have finite x, y, z away from the sensor.",

@@ -19,12 +19,24 @@ constexpr int kLanes = 8;
 using Lanes = float __attribute__((vector_size(4 * kLanes)));
 using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< masks as well: -1 = true
 
+[[gnu::always_inline]] inline Lanes load_lanes(const float* values) {
+  Lanes lanes;
+  __builtin_memcpy(&lanes, values, sizeof(lanes));
+  return lanes;
+}
+
 [[gnu::always_inline]] inline Lanes magnitude(const Lanes& a) { return a < 0 ? -a : a; }
 
 [[gnu::always_inline]] inline Lanes root(const Lanes& a) {
   Lanes result = {};
   for (int i = 0; i < kLanes; ++i) result[i] = std::sqrt(a[i]);
   return result;
+}
+
+[[gnu::always_inline]] inline int sum_of(const LaneInts& a) {
+  int sum = 0;
+  for (int i = 0; i < kLanes; ++i) sum += a[i];
+  return sum;
 }
 
 /// In a fixed order, whatever the processor.

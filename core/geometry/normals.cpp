@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/geometry/lanes.h"
 #include "core/parallel.h"
 
 namespace binpose {
@@ -15,12 +16,38 @@ constexpr int kFewestNeighbours = 4;           // besides the pixel itself, in a
 /// Depth step between neighbours, in pixel widths per pixel, beyond which they lie on different surfaces.
 constexpr float kSteepest = 3.0F;
 
-/// Sums of a least-squares fit of w = a x + b y + c, relative to the window's centre.
-struct PlaneSums {
-  float n = 0, x = 0, y = 0, w = 0, xx = 0, xy = 0, yy = 0, xw = 0, yw = 0, ww = 0;
+/// The measured points of a map as inverse depth over the image, one array each, with a margin of nothing measured.
+struct RayImage {
+  int stride, margin;
+  std::vector<float> x, y;  ///< tangents of the ray through the point
+  std::vector<float> z, w;  ///< depth and inverse depth; 0: nothing measured
 
-  void add(float dx, float dy, float dw) {
-    n += 1;
+  RayImage(const DepthMap& map, int margin) : stride(map.width + 2 * margin + kLanes), margin(margin) {
+    const std::size_t count = static_cast<std::size_t>(stride) * (map.height + 2 * margin);
+    for (std::vector<float>* values : {&x, &y, &z, &w}) values->assign(count, 0);
+    for (int v = 0; v < map.height; ++v) {
+      for (int u = 0; u < map.width; ++u) {
+        const Eigen::Vector3f& p = map.points[static_cast<std::size_t>(v) * map.width + u];
+        if (!(p.z() > 0)) continue;
+        const std::size_t i = at(u, v);
+        z[i] = p.z();
+        w[i] = 1 / p.z();
+        x[i] = p.x() * w[i];
+        y[i] = p.y() * w[i];
+      }
+    }
+  }
+  std::size_t at(int u, int v) const { return static_cast<std::size_t>(v + margin) * stride + u + margin; }
+};
+
+/// Sums of a least-squares fit of w = a x + b y + c, relative to the window's centre; eight windows at a time.
+struct PlaneSums {
+  Lanes n = {}, x = {}, y = {}, w = {}, xx = {}, xy = {}, yy = {}, xw = {}, yw = {}, ww = {};
+
+  [[gnu::always_inline]] void add(const LaneInts& belongs, const Lanes& all_x, const Lanes& all_y, const Lanes& all_w) {
+    const Lanes zero = {};
+    const Lanes dx = belongs ? all_x : zero, dy = belongs ? all_y : zero, dw = belongs ? all_w : zero;
+    n += belongs ? zero + 1 : zero;
     x += dx;
     y += dy;
     w += dw;
@@ -31,54 +58,64 @@ struct PlaneSums {
     yw += dy * dw;
     ww += dw * dw;
   }
+};
 
-  /// (a, b, dw at the centre) and the standard deviation of w about the plane; false when the points lie on a line.
-  bool solve(Eigen::Vector3f& plane, float& deviation) const {
-    const float vxx = xx - x * x / n, vxy = xy - x * y / n, vyy = yy - y * y / n;
-    const float vxw = xw - x * w / n, vyw = yw - y * w / n;
-    const float det = vxx * vyy - vxy * vxy;
-    if (!(det > 0.05F * vxx * vyy) || !(det > 0)) return false;
-    const float a = (vxw * vyy - vyw * vxy) / det, b = (vyw * vxx - vxw * vxy) / det;
-    plane = {a, b, (w - a * x - b * y) / n};
-    const float sum_sq = ww - w * w / n - a * vxw - b * vyw;
-    deviation = std::sqrt(std::max(0.0F, sum_sq) / std::max(1.0F, n - 3));
-    return true;
+/// A plane w = a x + b y + c and the standard deviation of w about it; `known` is false when the points lie on a line.
+struct PlaneFit {
+  Lanes a, b, c, deviation;
+  LaneInts known;
+
+  [[gnu::always_inline]] explicit PlaneFit(const PlaneSums& s) {
+    const Lanes zero = {}, n = s.n > 0 ? s.n : zero + 1;
+    const Lanes vxx = s.xx - s.x * s.x / n, vxy = s.xy - s.x * s.y / n, vyy = s.yy - s.y * s.y / n;
+    const Lanes vxw = s.xw - s.x * s.w / n, vyw = s.yw - s.y * s.w / n;
+    const Lanes det = vxx * vyy - vxy * vxy;
+    known = (det > 0.05F * vxx * vyy) & (det > 0) & (s.n >= kFewestNeighbours + 1);
+    const Lanes divisor = known ? det : zero + 1;
+    a = (vxw * vyy - vyw * vxy) / divisor;
+    b = (vyw * vxx - vxw * vxy) / divisor;
+    c = (s.w - a * s.x - b * s.y) / n;
+    const Lanes sum_sq = s.ww - s.w * s.w / n - a * vxw - b * vyw;
+    const Lanes freedom = n > 4 ? n - 3 : zero + 1;
+    deviation = root((sum_sq > 0 ? sum_sq : zero) / freedom);
   }
 };
 
-struct Fit {
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-  float deviation = -1;  ///< of the window's points from the plane, along the normal, metres; negative: not known
-};
-
-Fit fit_window(const DepthMap& map, int u, int v, int radius) {
-  const Eigen::Vector3f& centre = map.points[v * map.width + u];
-  const float inverse = 1 / centre.z();
-  const float x0 = centre.x() * inverse, y0 = centre.y() * inverse;
-  const float step = kSteepest * static_cast<float>(radius) * centre.z() / map.focal;
-  PlaneSums sums;
-  for (int row = std::max(0, v - radius); row <= std::min(map.height - 1, v + radius); ++row) {
-    for (int column = std::max(0, u - radius); column <= std::min(map.width - 1, u + radius); ++column) {
-      const Eigen::Vector3f& p = map.points[row * map.width + column];
-      if (!(std::abs(p.z() - centre.z()) < step)) continue;
-      const float w = 1 / p.z();
-      // Scaled so that sums of a fit at any distance stay near 1.
-      sums.add((p.x() * w - x0) * map.focal, (p.y() * w - y0) * map.focal, w * centre.z() - 1);
+/// Normals of a row of pixels; `deviations` gets how far each whole window's points lie off its plane, along the
+/// normal, metres.
+BINPOSE_VECTORISED
+void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, std::vector<float>& deviations) {
+  const auto whole = static_cast<float>((2 * radius + 1) * (2 * radius + 1));
+  const float steepest = kSteepest * static_cast<float>(radius) / map.focal;
+  for (int u = 0; u < map.width; u += kLanes) {
+    const std::size_t centre = rays.at(u, v);
+    const Lanes x0 = load_lanes(&rays.x[centre]), y0 = load_lanes(&rays.y[centre]), z0 = load_lanes(&rays.z[centre]);
+    PlaneSums sums;
+    for (int row = -radius; row <= radius; ++row) {
+      for (int column = -radius; column <= radius; ++column) {
+        const std::size_t i = rays.at(u + column, v + row);
+        const Lanes z = load_lanes(&rays.z[i]);
+        // Scaled so that sums of a fit at any distance stay near 1.
+        sums.add((z > 0) & (magnitude(z - z0) < steepest * z0), (load_lanes(&rays.x[i]) - x0) * map.focal,
+                 (load_lanes(&rays.y[i]) - y0) * map.focal, load_lanes(&rays.w[i]) * z0 - 1);
+      }
+    }
+    const PlaneFit fit(sums);
+    // w z0 = 1 + dw + a focal (x - x0) + b focal (y - y0) is (normal . point) over the plane's distance.
+    const Lanes a = fit.a * map.focal, b = fit.b * map.focal, c = 1 + fit.c - a * x0 - b * y0;
+    const Lanes length = root(a * a + b * b + c * c);
+    const Lanes cosine = (a * x0 + b * y0 + c) / (length * root(x0 * x0 + y0 * y0 + 1));
+    const LaneInts good = fit.known & (cosine >= kGrazingCosine);
+    const LaneInts steady = good & (sums.n == whole) & (cosine > kSteadyCosine);
+    const Lanes off = fit.deviation * z0 * cosine;
+    for (int lane = 0; lane < std::min(kLanes, map.width - u); ++lane) {
+      const int i = v * map.width + u + lane;
+      if (!map.measured(i)) continue;
+      const Eigen::Vector3f normal = -Eigen::Vector3f(a[lane], b[lane], c[lane]) / length[lane];
+      map.normals[i] = good[lane] != 0 ? normal : Eigen::Vector3f(0, 0, 0);
+      deviations[i] = steady[lane] != 0 ? off[lane] : -1;
     }
   }
-  Fit fit;
-  Eigen::Vector3f plane;
-  float deviation = 0;
-  if (sums.n < kFewestNeighbours + 1 || !sums.solve(plane, deviation)) return fit;
-  // w z0 = 1 + dw + a focal (x - x0) + b focal (y - y0) is (normal . point) over the plane's distance.
-  const float a = plane[0] * map.focal, b = plane[1] * map.focal;
-  const Eigen::Vector3f normal = -Eigen::Vector3f(a, b, 1 + plane[2] - a * x0 - b * y0).normalized();
-  const float cosine = -normal.dot(centre) / centre.norm();
-  if (cosine < kGrazingCosine) return fit;
-  fit.normal = normal;
-  const bool full = sums.n == static_cast<float>((2 * radius + 1) * (2 * radius + 1));
-  if (full && cosine > kSteadyCosine) fit.deviation = deviation * centre.z() * cosine;
-  return fit;
 }
 
 /// The noise that explains the quietest windows: edges and curvature only make others louder.
@@ -102,15 +139,8 @@ double normal_error(double noise, double pixel_size, int radius) {
 
 void estimate_normals(DepthMap& map, int radius, int threads) {
   std::vector<float> deviations(map.points.size(), -1);
-  parallel_for(map.height, threads, [&](int v) {
-    for (int u = 0; u < map.width; ++u) {
-      const int i = v * map.width + u;
-      if (!map.measured(i)) continue;
-      const Fit fit = fit_window(map, u, v, radius);
-      map.normals[i] = fit.normal;
-      deviations[i] = fit.deviation;
-    }
-  });
+  const RayImage rays(map, radius);
+  parallel_for(map.height, threads, [&](int v) { fit_row(map, rays, v, radius, deviations); });
   map.noise = noise_of(std::move(deviations));
 }
 

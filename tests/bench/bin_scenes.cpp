@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -92,10 +93,12 @@ std::vector<std::filesystem::path> scene_folders(const std::string& folder, cons
 
 using Trained = std::map<std::string, std::pair<Model, PoseJudge>>;
 
-/// Trains the parts of a folder, or ends the program saying which it can't.
-Trained train_all(const std::string& parts_folder, const TrainParams& train_params, const RunControl& control) {
+/// Trains the parts of a folder, or the one named `only`, or ends the program saying which it can't.
+Trained train_all(const std::string& parts_folder, const std::string& only, const TrainParams& train_params,
+                  const RunControl& control) {
   Trained trained;
   for (const ScenePart& part : read_parts(parts_folder)) {
+    if (!only.empty() && part.name != only) continue;
     const auto start = std::chrono::steady_clock::now();
     absl::StatusOr<Model> model = train(part.mesh, train_params, control);
     if (!model.ok()) {
@@ -111,6 +114,17 @@ Trained train_all(const std::string& parts_folder, const TrainParams& train_para
     trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
   }
   return trained;
+}
+
+/// The answer of the fastest of a few equal searches: other work on the machine only ever adds time.
+absl::StatusOr<DetectResult> fastest_of(int repeats, const PointCloud& cloud, std::span<const Model* const> models,
+                                        const DetectParams& params, const RunControl& control) {
+  absl::StatusOr<DetectResult> best = detect(cloud, models, params, control);
+  for (int i = 1; i < repeats && best.ok(); ++i) {
+    absl::StatusOr<DetectResult> next = detect(cloud, models, params, control);
+    if (next.ok() && next->stats.total_seconds < best->stats.total_seconds) best = std::move(next);
+  }
+  return best;
 }
 
 /// Searches a scene for every part but its own and prints all that is found.
@@ -132,7 +146,7 @@ bool search_for_wrong_parts(const BinScene& scene, const Trained& trained, const
 
 int main(int argc, char** argv) {
   CLI::App app("Searches whole scenes and compares with the truth.");
-  std::string parts_folder, scenes_folder, filter;
+  std::string parts_folder, scenes_folder, filter, only;
   bool wrong_parts = false;
   bool ply = false, per_scene = false, dump = false;
   RunControl control;
@@ -141,6 +155,7 @@ int main(int argc, char** argv) {
   app.add_option("parts", parts_folder)->required();
   app.add_option("scenes", scenes_folder)->required();
   app.add_option("--filter", filter);
+  app.add_option("--part", only, "trains this part alone and takes its scenes only");
   app.add_flag("--wrong-parts", wrong_parts, "search each scene for every part but its own: all found is wrong");
   app.add_flag("--ply", ply);
   app.add_flag("--per-scene", per_scene);
@@ -156,17 +171,22 @@ int main(int argc, char** argv) {
   const CLI::Option* paper =
       app.add_option("--paper", paper_selection, "the paper's preset with this selection of pairs")
           ->transform(CLI::CheckedTransformer(selections));
+  int repeats = 1;
+  app.add_option("--repeat", repeats, "searches of each scene; the fastest counts");
   double noise_mm = 0, point_share = 1;
   app.add_option("--noise-mm", noise_mm, "more range noise, standard deviation along the ray");
   app.add_option("--point-share", point_share, "share of the points that is kept, at random");
+  std::optional<int> cluster_limit;
+  app.add_option("--clusters", cluster_limit, "clusters of votes that are looked at, per source");
   CLI11_PARSE(app, argc, argv);
   if (paper->count() > 0) {
     train_params = TrainParams::paper();
     train_params.selection = paper_selection;
     detect_params = DetectParams::paper();
   }
+  if (cluster_limit) detect_params.cluster_limit = *cluster_limit;
 
-  const Trained trained = train_all(parts_folder, train_params, control);
+  const Trained trained = train_all(parts_folder, only, train_params, control);
 
   std::map<std::string, Row> rows;
   Row all;
@@ -175,13 +195,14 @@ int main(int argc, char** argv) {
   for (const auto& folder : folders) {
     BinScene scene = read_scene(folder, ply);
     degrade(scene.cloud, noise_mm / 1000, point_share, static_cast<unsigned>(&folder - folders.data()));
+    if (!only.empty() && scene.part != only) continue;
     if (wrong_parts) {
       if (!search_for_wrong_parts(scene, trained, detect_params, control)) return 1;
       continue;
     }
     const auto& [model, judge] = trained.at(scene.part);
     const Model* const models[] = {&model};
-    const absl::StatusOr<DetectResult> result = detect(scene.cloud, models, detect_params, control);
+    const absl::StatusOr<DetectResult> result = fastest_of(repeats, scene.cloud, models, detect_params, control);
     if (!result.ok()) {
       std::fprintf(stderr, "%s: %s\n", scene.name.c_str(), result.status().ToString().c_str());
       return 1;

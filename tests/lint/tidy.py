@@ -38,7 +38,8 @@ def object_of(entry):
 
 def fingerprint(entry, files):
     digest = hashlib.sha256(entry["command"].encode())
-    for file in [ROOT / ".clang-tidy", Path(entry["file"]), *sorted(files)]:
+    rules = [folder / ".clang-tidy" for folder in Path(entry["file"]).parents if folder.is_relative_to(ROOT)]
+    for file in [*rules, Path(entry["file"]), *sorted(files)]:
         digest.update(file.read_bytes() if file.exists() else b"")
     return digest.hexdigest()
 

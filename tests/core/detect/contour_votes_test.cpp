@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/detect/cluster.h"
+#include "tests/scenes/random.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
 
@@ -41,6 +42,42 @@ TEST(ContourVotes, FindAPartOfWhichOnlyAFlatSideShows) {
   });
   ASSERT_NE(right, clusters.end());
   EXPECT_LT(right - clusters.begin(), 3) << "among the first";
+}
+
+/// Contours of a few planes, far enough apart in the image that none is thinned out.
+void scatter_contours(DepthMap& map) {
+  constexpr int kStep = 8;  // pixels
+  scenes::Random random(11);
+  map.contours.clear();
+  for (int v = kStep / 2; v < map.height; v += kStep) {
+    for (int u = kStep / 2; u < map.width; u += kStep) {
+      const float z = random.uniform(0, 1) < 0.5 ? 0.45F : 0.46F;
+      const auto angle = static_cast<float>(random.uniform(0, 6.28));
+      const auto tilt = static_cast<float>(random.uniform(0, 0.3));
+      map.contours.push_back(
+          {{(static_cast<float>(u) - map.cx) * z / map.focal, (static_cast<float>(v) - map.cy) * z / map.focal, z},
+           {std::sin(tilt), 0, -std::cos(tilt)},
+           {std::cos(angle), std::sin(angle), 0}});
+    }
+  }
+  map.background.assign(map.points.size(), 0);
+}
+
+TEST(ContourVotes, ComeFromThePairsThatALoopOverAllFinds) {
+  Scene scene;
+  scatter_contours(scene.map);
+  const auto diameter = static_cast<float>(scene.model.diameter);
+  std::size_t pairs = 0;
+  for (std::size_t a = 0; a < scene.map.contours.size(); ++a) {
+    for (std::size_t b = a + 1; b < scene.map.contours.size(); ++b) {
+      if (contour_frame(scene.map.contours[a], scene.map.contours[b], kShortestContourPair * diameter,
+                        kLongestContourPair * diameter, kContourFlatness * diameter)) {
+        ++pairs;
+      }
+    }
+  }
+  EXPECT_GT(pairs, 100U);
+  EXPECT_EQ(contour_votes(scene.map, scene.model, {}).scene_pairs, pairs);
 }
 
 TEST(ContourVotes, AreNoneWithoutContours) {

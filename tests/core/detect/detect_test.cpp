@@ -23,12 +23,12 @@ testing::PinholeSensor sensor() {
   return s;
 }
 
-/// Four blocks in poses of all kinds.
+/// Four blocks in poses of all kinds, of which enough shows to tell them from any other.
 std::vector<testing::PlacedMesh> four_blocks() {
   const Mesh mesh = testing::l_block();
   return {{mesh, testing::pose(40, {1, 0.5, 0.2}, {-0.10, -0.05, 0.44})},
           {mesh, testing::pose(-60, {0.3, 1, 0.4}, {0.08, -0.09, 0.45})},
-          {mesh, testing::pose(150, {1, 0.2, 0.6}, {0.08, 0.06, 0.45})},
+          {mesh, testing::pose(110, {0.3, 1, -0.5}, {0.08, 0.06, 0.45})},
           {mesh, testing::pose(50, {-1, 0.4, 0.3}, {-0.10, 0.04, 0.44})}};
 }
 
@@ -95,15 +95,14 @@ TEST(Detect, FindsPartsOfSeveralModelsAndSaysWhich) {
 }
 
 TEST(Detect, GivesPosesInTheFrameOfTheCloud) {
-  std::vector<testing::PlacedMesh> bodies = four_blocks();
-  bodies.erase(bodies.begin() + 2);  // half a turn makes little difference to what shows of it
+  const std::vector<testing::PlacedMesh> bodies = four_blocks();
   const Model model = testing::quick_model(testing::l_block());
   PointCloud cloud = testing::render(bodies, sensor());
   const Pose T_robot_sensor = testing::pose(170, {1, 0.1, 0.3}, {0.5, -0.2, 1.1});
   for (Eigen::Vector3f& p : cloud.points) p = (T_robot_sensor * p.cast<double>()).cast<float>();
   cloud.sensor_position = T_robot_sensor.translation();
   const DetectResult result = *search(cloud, model);
-  ASSERT_GE(result.hypotheses.size(), 3u);
+  ASSERT_GE(result.hypotheses.size(), 4u);
   for (const testing::PlacedMesh& body : bodies) {
     int found = 0;
     for (const PoseHypothesis& h : result.hypotheses) {

@@ -86,6 +86,53 @@ Evidence surface_evidence_by_loop(const Scan& scan, const Eigen::Isometry3f& T, 
   return sum;
 }
 
+/// How far the scene lies behind an outline point's surface carried on along `outward`; NaN where nothing was measured.
+float depth_behind_by_hand(const DepthMap& map, const ContourPoint& contour, const Eigen::Isometry3f& T, float distance,
+                           float steepest) {
+  const Eigen::Vector3f p = T * contour.position, normal = T.linear() * contour.normal;
+  const Eigen::Vector3f outward = T.linear() * contour.outward;
+  const int pixel = map.pixel_of(p + distance * outward);
+  if (pixel < 0 || !map.measured(pixel)) return NAN;
+  const float slope = std::clamp(normal.dot(outward) / std::max(-normal.z(), 0.05F), -steepest, steepest);
+  return (map.points[pixel].z() - p.z() - slope * distance) / std::sqrt(1 + slope * slope);
+}
+
+/// Outline points confirmed and contradicted, one point after the other: there up to a pixel inside, gone two outside.
+std::pair<int, int> outline_by_loop(const Scan& scan, const Eigen::Isometry3f& T, float tolerance) {
+  int confirmed = 0, contradicted = 0;
+  for (const ContourPoint& contour : scan.model.outlines[nearest_viewpoint(scan.model, T)]) {
+    const float inside = depth_behind_by_hand(scan.map, contour, T, -scan.map.pixel_size, 5);
+    const float outside = depth_behind_by_hand(scan.map, contour, T, 2 * scan.map.pixel_size, 1);
+    if (inside < -tolerance) continue;  // hidden
+    if (inside > tolerance) {
+      ++contradicted;
+    } else if (outside > tolerance) {
+      ++confirmed;
+    } else if (outside >= -tolerance) {
+      ++contradicted;
+    }
+  }
+  return {confirmed, contradicted};
+}
+
+TEST(Verify, ComparesEightOutlinePointsAtATimeAsALoopDoesOneByOne) {
+  const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
+                                        testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
+  for (const Pose& pose : {kLying, kTilted}) {
+    const Scan scan(testing::l_block(), pose, {in_front});
+    for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
+      const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
+      const Evidence fast = verify(scan.map, scan.model, T, scan.options());
+      const auto [confirmed, contradicted] = outline_by_loop(scan, T, scan.options().tolerance);
+      const auto count = static_cast<float>(scan.model.outlines[nearest_viewpoint(scan.model, T)].size());
+      EXPECT_GT(confirmed + contradicted, 10);
+      // A point on a limit may fall to either side.
+      EXPECT_NEAR(fast.outline_confirmed * count, static_cast<float>(confirmed), 1.5F);
+      EXPECT_NEAR(fast.outline_contradicted * count, static_cast<float>(contradicted), 1.5F);
+    }
+  }
+}
+
 TEST(Verify, ComparesEightPointsAtATimeAsALoopDoesOneByOne) {
   const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
                                         testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
