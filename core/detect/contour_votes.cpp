@@ -74,6 +74,7 @@ Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& c
       match_point(grid, a, static_cast<int>(pixels / kBlock) + 1, model, parts[task]);
     }
   });
+  if (control.stop.stop_requested()) return {};
   return concatenate(parts);
 }
 

@@ -95,7 +95,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
     options.neighbourhood = kNeighbourhood * diameter;
     options.most_per_neighbourhood = kClustersPerNeighbourhood;
     options.most = params.cluster_limit;
-    for (const PoseCluster& c : cluster(votes.votes, options)) {
+    for (const PoseCluster& c : cluster(votes.votes, options, control)) {
       Candidate candidate;
       candidate.model_index = model_index;
       candidate.T_view_model = pose_of(c, model);
@@ -184,6 +184,7 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
     if (params.use_contours) by_contour = contour_votes(map, model, control);
   }
   // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
+  if (control.stop.stop_requested()) return {};
   std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, params, control, stats);
   const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, params, control, stats);
   candidates.insert(candidates.end(), more.begin(), more.end());

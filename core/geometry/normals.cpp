@@ -100,9 +100,10 @@ double normal_error(double noise, double pixel_size, int radius) {
   return noise / (pixel_size * std::sqrt(sum_sq_offset));
 }
 
-void estimate_normals(DepthMap& map, int radius, int threads) {
+void estimate_normals(DepthMap& map, int radius, const RunControl& control) {
   std::vector<float> deviations(map.points.size(), -1);
-  parallel_for(map.height, threads, [&](int v) {
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (control.interrupted()) return;
     for (int u = 0; u < map.width; ++u) {
       const int i = v * map.width + u;
       if (!map.measured(i)) continue;
@@ -111,6 +112,7 @@ void estimate_normals(DepthMap& map, int radius, int threads) {
       deviations[i] = fit.deviation;
     }
   });
+  if (control.interrupted()) return;
   map.noise = noise_of(std::move(deviations));
 }
 
