@@ -92,8 +92,10 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   std::vector<Candidate> candidates;
   std::vector<VerifyOptions> verification;
   for (std::size_t m = 0; m < models.size() && !control.stop.stop_requested(); ++m) {
-    DepthMap map = prepare(*view, *models[m], params, control, stats);
-    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, control, stats);
+    const RunControl turn = control.with_share_of_time(1.0 / static_cast<double>(models.size() - m));
+    DepthMap map = prepare(*view, *models[m], params, turn, stats);
+    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, turn, stats);
+    if (turn.past_deadline()) stats.stop_reason = StopReason::kDeadline;
     candidates.insert(candidates.end(), found.begin(), found.end());
     verification.push_back(final_verification(map, *models[m]));
     if (m == 0 || map.pixel_size < finest.pixel_size) finest = std::move(map);
