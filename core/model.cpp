@@ -10,7 +10,7 @@ constexpr double kBinMargin = 0.10471975511965977;
 
 }  // namespace
 
-void derive(Model& model) {
+void derive(Model& model, const RunControl& control) {
   model.centre = 0.5 * (model.box_min + model.box_max);
   model.viewpoints = view_directions(model.params.viewpoint_count);
   model.visible_from.assign(model.viewpoints.size(), {});
@@ -31,8 +31,10 @@ void derive(Model& model) {
   }
   const float mean = sum / static_cast<float>(model.viewpoints.size());
   for (float& area : model.view_area) area /= std::max(mean, 1e-6F);
+  if (control.interrupted()) return;
   model.pair_table = PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
                                static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin);
+  if (control.interrupted()) return;
   model.contour_table = ContourTable(model.contour_points, model.contour_pairs, model.contour_weights,
                                      model.centre.cast<float>(), static_cast<float>(model.diameter));
 }

@@ -12,6 +12,7 @@
 #include "core/geometry/view_sphere.h"
 #include "core/pair_table.h"
 #include "core/params.h"
+#include "core/run_control.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
@@ -58,7 +59,7 @@ struct Model {
   ContourTable contour_table;
 };
 
-/// Fills the derived members from the stored ones.
-void derive(Model& model);
+/// Fills the derived members from the stored ones; not all of them when `control` interrupts.
+void derive(Model& model, const RunControl& control = {});
 
 }  // namespace binpose

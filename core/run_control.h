@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <optional>
 #include <stop_token>
 
@@ -18,6 +19,17 @@ struct RunControl {
   bool past_deadline() const { return deadline && std::chrono::steady_clock::now() >= *deadline; }
   /// Nobody waits for the rest.
   bool interrupted() const { return stop.stop_requested() || past_deadline(); }
+  /// The same for loops of steps below a microsecond: looks at every 1024th step only.
+  bool interrupted_at(std::size_t step) const { return step % 1024 == 0 && interrupted(); }
+  /// For a stage that may take a share of the time that is left, so that something is left for the stages after it.
+  RunControl with_share_of_time(double share) const {
+    RunControl stage = *this;
+    const auto now = std::chrono::steady_clock::now();
+    if (deadline) {
+      stage.deadline = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * (*deadline - now));
+    }
+    return stage;
+  }
   /// OK, CANCELLED or DEADLINE_EXCEEDED.
   absl::Status status() const {
     if (stop.stop_requested()) return absl::CancelledError("The caller cancelled the work.");

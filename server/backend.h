@@ -6,6 +6,7 @@
 #include "server/metrics.h"
 #include "server/model_store.h"
 #include "server/tokens.h"
+#include "server/write_watch.h"
 
 namespace binpose::server {
 
@@ -18,6 +19,7 @@ struct Backend {
   const Tokens& tokens;
   Metrics& metrics;
   Drain& drain;
+  WriteWatch& writes;
 };
 
 }  // namespace binpose::server

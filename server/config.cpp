@@ -53,6 +53,9 @@ void add_limit_options(CLI::App& app, Config& config) {
       ->check(CLI::Range(1, 1'000'000));
   app.add_option("--drain-timeout", config.drain_timeout_seconds, "Seconds that calls may go on after SIGTERM")
       ->check(CLI::Range(0, 3600));
+  app.add_option("--write-timeout", config.write_timeout_seconds,
+                 "Seconds that a caller may leave an answer untaken; then its call is cancelled")
+      ->check(CLI::Range(1, 3600));
 }
 
 }  // namespace

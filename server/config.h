@@ -35,6 +35,8 @@ struct Config {
   int models_memory_mib = 1024;
   /// How long calls may go on after SIGTERM.
   int drain_timeout_seconds = 30;
+  /// How long a caller may leave a message of its call untaken, before the call is cancelled.
+  int write_timeout_seconds = 60;
   /// PEM files of the certificate chain and its key; empty = plaintext. Read again when they change.
   std::filesystem::path tls_cert;
   std::filesystem::path tls_key;

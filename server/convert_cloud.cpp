@@ -11,6 +11,7 @@
 #include "core/io/read_pcd.h"
 #include "core/io/read_ply.h"
 #include "server/convert_geometry.h"
+#include "server/decode_time.h"
 #include "server/status.h"
 
 namespace binpose::server {
@@ -136,16 +137,16 @@ absl::StatusOr<PointCloud> from_depth(const v1::DepthImage& message, double metr
   return absl::InvalidArgumentError("cloud.depth has no pixels; set uint16 or float32.");
 }
 
-absl::StatusOr<PointCloud> decode(const v1::PointCloud& message, double metres_per_unit) {
+absl::StatusOr<PointCloud> decode(const v1::PointCloud& message, double metres_per_unit, const RunControl& control) {
   switch (message.data_case()) {
     case v1::PointCloud::kPoints:
       return from_points(message.points(), metres_per_unit);
     case v1::PointCloud::kDepth:
       return from_depth(message.depth(), metres_per_unit);
     case v1::PointCloud::kPcd:
-      return in_field("cloud.pcd", read_pcd(message.pcd(), metres_per_unit, kMaxCloudPoints));
+      return in_field("cloud.pcd", read_pcd(message.pcd(), metres_per_unit, kMaxCloudPoints, control));
     case v1::PointCloud::kPly:
-      return in_field("cloud.ply", read_ply_cloud(message.ply(), metres_per_unit, kMaxCloudPoints));
+      return in_field("cloud.ply", read_ply_cloud(message.ply(), metres_per_unit, kMaxCloudPoints, control));
     case v1::PointCloud::DATA_NOT_SET:
       break;
   }
@@ -195,11 +196,13 @@ absl::Status set_sensor_position(const v1::Vector3& message, double metres_per_u
 
 }  // namespace
 
-absl::StatusOr<PointCloud> to_cloud(const v1::PointCloud& message) {
+absl::StatusOr<PointCloud> to_cloud(const v1::PointCloud& message, const RunControl& control) {
   const absl::StatusOr<double> metres = metres_per_unit("cloud.unit", message.unit());
   if (!metres.ok()) return metres.status();
-  absl::StatusOr<PointCloud> cloud = decode(message, *metres);
+  absl::StatusOr<PointCloud> cloud =
+      decode_in_time("cloud", control, [&](const RunControl& limited) { return decode(message, *metres, limited); });
   if (!cloud.ok()) return cloud;
+  if (control.stop.stop_requested()) return control.status();
   absl::Status status = clean_points(cloud->points);
   if (status.ok()) status = clean_normals(*cloud);
   if (status.ok() && message.has_sensor_position()) {

@@ -5,6 +5,7 @@
 #include "absl/status/statusor.h"
 #include "binpose/v1/types.pb.h"
 #include "core/geometry/point_cloud.h"
+#include "core/run_control.h"
 
 namespace binpose::server {
 
@@ -17,7 +18,8 @@ inline constexpr double kMaxCoordinateMetres = 1000;
 /// @param message  hostile; the fields are called "cloud..." in errors.
 /// Errors, each naming field, value and limit: INVALID_ARGUMENT (unit missing, no encoding, no points, bytes that do
 /// not fit width x height, intrinsics or scale out of range, a coordinate beyond kMaxCoordinateMetres, a normal that
-/// has not unit length), RESOURCE_EXHAUSTED (more than kMaxCloudPoints).
-absl::StatusOr<PointCloud> to_cloud(const v1::PointCloud& message);
+/// has not unit length), RESOURCE_EXHAUSTED (more than kMaxCloudPoints, or more than kMaxDecodeTime); or what `control`
+/// says.
+absl::StatusOr<PointCloud> to_cloud(const v1::PointCloud& message, const RunControl& control = {});
 
 }  // namespace binpose::server

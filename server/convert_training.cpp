@@ -6,6 +6,7 @@
 #include "absl/strings/str_format.h"
 #include "core/io/read_mesh.h"
 #include "server/convert_geometry.h"
+#include "server/decode_time.h"
 #include "server/status.h"
 
 namespace binpose::server {
@@ -92,12 +93,14 @@ absl::StatusOr<TrainParams> to_train_params(const v1::TrainParams& message) {
   return params;
 }
 
-absl::StatusOr<Mesh> to_mesh(const v1::Mesh& message) {
+absl::StatusOr<Mesh> to_mesh(const v1::Mesh& message, const RunControl& control) {
   const absl::StatusOr<double> metres = metres_per_unit("mesh.unit", message.unit());
   if (!metres.ok()) return metres.status();
   const absl::StatusOr<MeshFormat> format = to_format(message.format());
   if (!format.ok()) return format.status();
-  return in_field("mesh.data", read_mesh(message.data(), *format, *metres));
+  return decode_in_time("mesh.data", control, [&](const RunControl& limited) {
+    return in_field("mesh.data", read_mesh(message.data(), *format, *metres, {}, limited));
+  });
 }
 
 std::optional<std::string> doubt_unit(double diameter, v1::LengthUnit unit) {

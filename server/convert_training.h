@@ -15,8 +15,8 @@ namespace binpose::server {
 /// Errors: INVALID_ARGUMENT, naming field, value and range.
 absl::StatusOr<TrainParams> to_train_params(const v1::TrainParams& message);
 
-/// Errors: those of read_mesh(), and INVALID_ARGUMENT (unit or format).
-absl::StatusOr<Mesh> to_mesh(const v1::Mesh& message);
+/// Errors: those of read_mesh(), INVALID_ARGUMENT (unit or format), RESOURCE_EXHAUSTED (more than kMaxDecodeTime).
+absl::StatusOr<Mesh> to_mesh(const v1::Mesh& message, const RunControl& control = {});
 
 /// A warning when a part of that diameter, metres, is so large or small that `unit` must be doubted.
 std::optional<std::string> doubt_unit(double diameter, v1::LengthUnit unit);

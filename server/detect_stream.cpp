@@ -6,9 +6,13 @@
 
 namespace binpose::server {
 
-DetectStream::DetectStream(const Surroundings& surroundings, std::optional<Clock::time_point> deadline,
-                           std::string trace_id)
-    : around_(surroundings), deadline_(deadline), trace_id_(std::move(trace_id)), call_(surroundings.drain) {
+DetectStream::DetectStream(const Surroundings& surroundings, grpc::CallbackServerContext& context,
+                           std::optional<Clock::time_point> deadline, std::string trace_id)
+    : around_(surroundings),
+      context_(context),
+      deadline_(deadline),
+      trace_id_(std::move(trace_id)),
+      call_(surroundings.drain) {
   around_.open_streams.Increment();
   advance([] {});
   call_.when_draining([this] { advance([this] { draining_ = true; }); });
@@ -29,6 +33,7 @@ void DetectStream::OnReadDone(bool ok) {
 }
 
 void DetectStream::OnWriteDone(bool /*ok*/) {
+  around_.writes.end(context_);
   // A failed write means a broken stream; the read that fails as well ends it.
   advance([this] {
     writing_ = false;
@@ -89,7 +94,10 @@ void DetectStream::advance(Change change) {
     if (!finished_ && frames_.empty() && (input_ended_ || draining_)) finish = finished_ = true;
     draining = draining_ && !input_ended_;
   }
-  if (write != nullptr) StartWrite(write);
+  if (write != nullptr) {
+    around_.writes.begin(context_);
+    StartWrite(write);
+  }
   if (read) StartRead(&incoming_);
   if (finish) Finish(draining ? grpc::Status(grpc::StatusCode::UNAVAILABLE, kEnding) : grpc::Status::OK);
 }

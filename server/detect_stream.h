@@ -17,6 +17,7 @@
 #include "server/compute_pool.h"
 #include "server/drain.h"
 #include "server/memory_budget.h"
+#include "server/write_watch.h"
 
 namespace binpose::server {
 
@@ -48,11 +49,14 @@ class DetectStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc
     ComputePool& pool;
     MemoryBudget& memory;  ///< holds the frames until they are answered
     Drain& drain;
+    WriteWatch& writes;
     prometheus::Gauge& open_streams;  ///< counts this stream while it lives
   };
 
+  /// @param context   of the call; lives as long as it does.
   /// @param trace_id  goes into the log beside what concerns the stream.
-  DetectStream(const Surroundings& surroundings, std::optional<Clock::time_point> deadline, std::string trace_id);
+  DetectStream(const Surroundings& surroundings, grpc::CallbackServerContext& context,
+               std::optional<Clock::time_point> deadline, std::string trace_id);
   ~DetectStream() override { around_.open_streams.Decrement(); }
 
   void OnReadDone(bool ok) override;
@@ -75,6 +79,7 @@ class DetectStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc
   void advance(Change change);
 
   const Surroundings around_;
+  grpc::CallbackServerContext& context_;
   const std::optional<Clock::time_point> deadline_;
   const std::string trace_id_;
   std::atomic<Clock::time_point> cancel_time_ = Clock::time_point::max();  ///< set before the stop is requested

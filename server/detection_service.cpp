@@ -1,5 +1,6 @@
 #include "server/detection_service.h"
 
+#include <algorithm>
 #include <memory>
 #include <set>
 #include <string>
@@ -40,6 +41,24 @@ absl::Status check_request(const v1::DetectRequest& request) {
   return absl::OkStatus();
 }
 
+/// The caller's control, with the request's time budget. Errors: INVALID_ARGUMENT.
+absl::StatusOr<RunControl> limit_time(const v1::DetectRequest& request, Clock::time_point arrival,
+                                      const RunControl& control) {
+  constexpr double kLeast = 0.001;
+  constexpr double kMost = 3600;
+  if (!request.has_time_budget_seconds()) return control;
+  const double seconds = request.time_budget_seconds();
+  if (!(seconds >= kLeast && seconds <= kMost)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("time_budget_seconds is %g; it must lie in [%g, %g].", seconds, kLeast, kMost));
+  }
+  RunControl limited = control;
+  const Clock::time_point end =
+      arrival + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  limited.deadline = std::min(end, control.deadline.value_or(end));
+  return limited;
+}
+
 absl::StatusOr<std::vector<std::shared_ptr<const StoredModel>>> find_models(const v1::DetectRequest& request,
                                                                             const ModelStore& models) {
   std::vector<std::shared_ptr<const StoredModel>> found;
@@ -60,7 +79,7 @@ absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, 
   if (!stored.ok()) return stored.status();
   const absl::StatusOr<DetectParams> params = to_detect_params(request.params());
   if (!params.ok()) return params.status();
-  const absl::StatusOr<PointCloud> cloud = to_cloud(request.cloud());
+  const absl::StatusOr<PointCloud> cloud = to_cloud(request.cloud(), {.stop = control.stop});
   if (!cloud.ok()) return cloud.status();
 
   std::vector<const Model*> wanted;
@@ -76,8 +95,9 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* DetectionService::D
     backend_.metrics.count_request(Method::kDetect, allowed.code(), 0);
     return new RefusedStream(to_grpc(allowed));
   }
-  return new DetectStream({*this, backend_.detections, backend_.requests, backend_.drain, backend_.metrics.streams()},
-                          compute_deadline(context->deadline()), trace_id_of(*context));
+  return new DetectStream(
+      {*this, backend_.detections, backend_.requests, backend_.drain, backend_.writes, backend_.metrics.streams()},
+      *context, compute_deadline(context->deadline()), trace_id_of(*context));
 }
 
 grpc::ByteBuffer DetectionService::answer(grpc::ByteBuffer& frame, Clock::time_point arrival,
@@ -92,7 +112,11 @@ grpc::ByteBuffer DetectionService::answer(grpc::ByteBuffer& frame, Clock::time_p
       return absl::InvalidArgumentError(absl::StrFormat("The frame's %d bytes are no DetectRequest.", bytes));
     }
     request_id = request.request_id();
-    return find_parts(request, backend_.models, control);
+    const absl::StatusOr<RunControl> within_budget = limit_time(request, arrival, control);
+    if (!within_budget.ok()) return within_budget.status();
+    absl::StatusOr<v1::DetectResponse> found = find_parts(request, backend_.models, *within_budget);
+    if (found.ok()) backend_.metrics.count_search(request.model_ids(), *found);
+    return found;
   });
   const LogRequest log_request(request_id);
   v1::DetectResponse response;

@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <vector>
 
 #include "absl/strings/str_format.h"
 
@@ -63,6 +65,24 @@ absl::Status write_durably(const std::filesystem::path& directory, const std::st
     return failure;
   }
   return sync_directory(directory);
+}
+
+void remove_leftovers(const std::filesystem::path& directory, std::string_view ending) {
+  constexpr std::string_view kRandom = ".XXXXXX";
+  const auto oldest = std::filesystem::file_time_type::clock::now() - std::chrono::minutes(10);
+  std::vector<std::filesystem::path> leftovers;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename();
+    if (!name.starts_with('.') || name.size() <= kRandom.size()) continue;
+    const std::string_view target = std::string_view(name).substr(0, name.size() - kRandom.size());
+    const bool is_temporary = target.ends_with(ending) && name[target.size()] == '.';
+    std::error_code ignored;
+    const auto written = std::filesystem::last_write_time(entry->path(), ignored);
+    if (is_temporary && !ignored && written < oldest) leftovers.push_back(entry->path());
+  }
+  for (const std::filesystem::path& path : leftovers) ::unlink(path.c_str());
 }
 
 absl::Status remove_durably(const std::filesystem::path& directory, const std::string& name) {

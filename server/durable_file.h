@@ -16,6 +16,10 @@ namespace binpose::server {
 /// ".<name>.XXXXXX". Errors: INTERNAL (naming file and reason, for example a full disk).
 absl::Status write_durably(const std::filesystem::path& directory, const std::string& name, std::string_view bytes);
 
+/// Removes the temporary files of names with this ending that a crash left behind: nobody has written to them for ten
+/// minutes, so that those of another server on the same directory stay.
+void remove_leftovers(const std::filesystem::path& directory, std::string_view ending);
+
 /// Removes `directory`/`name` so that it stays away after a power cut; a missing file is no error. Errors: INTERNAL.
 absl::Status remove_durably(const std::filesystem::path& directory, const std::string& name);
 

@@ -48,6 +48,9 @@ Metrics::Metrics()
     : queue_seconds_(durations(*registry_, "binpose_detect_queue_duration_seconds",
                                "Time between a frame's arrival and the start of its computation.")
                          .Add({}, duration_buckets())),
+      train_seconds_(durations(*registry_, "binpose_train_duration_seconds",
+                               "Time of trainings that ended well, from their start to the saved model.")
+                         .Add({}, prometheus::Histogram::BucketBoundaries{0.5, 1, 2.5, 5, 10, 30, 60, 120, 300})),
       queue_cancel_seconds_(cancels(*registry_, "queue")),
       compute_cancel_seconds_(cancels(*registry_, "compute")),
       training_cancel_seconds_(cancels(*registry_, "training")),
@@ -61,7 +64,15 @@ Metrics::Metrics()
       resident_bytes_(gauge(*registry_, "process_resident_memory_bytes", "Resident memory of the process.")),
       streams_(gauge(*registry_, "binpose_detect_streams", "Detect streams that are open.")),
       skipped_model_files_(counter(*registry_, "binpose_model_files_skipped_total",
-                                   "Times that a file in the model directory could not be used.")) {
+                                   "Times that a file in the model directory could not be used.")),
+      model_searches_(prometheus::BuildCounter()
+                          .Name("binpose_model_searches_total")
+                          .Help("Clouds that were searched for a model.")
+                          .Register(*registry_)),
+      model_found_(prometheus::BuildCounter()
+                       .Name("binpose_model_hypotheses_total")
+                       .Help("Hypotheses of a model that were answered.")
+                       .Register(*registry_)) {
   static_assert(kMethodNames.size() == kMethods && kStageNames.size() == kStages);
   auto& requests = prometheus::BuildCounter()
                        .Name("binpose_requests_total")
@@ -99,6 +110,29 @@ void Metrics::count_request(Method method, absl::StatusCode code, double seconds
   const int code_index = static_cast<int>(code);
   requests_[index][code_index < kCodes ? code_index : static_cast<int>(absl::StatusCode::kUnknown)]->Increment();
   request_seconds_[index]->Observe(seconds);
+}
+
+void Metrics::count_search(const google::protobuf::RepeatedPtrField<std::string>& model_ids,
+                           const v1::DetectResponse& response) {
+  const std::lock_guard lock(mutex_);
+  for (const std::string& id : model_ids) {
+    const auto [entry, is_new] = model_series_.try_emplace(id);
+    if (is_new) entry->second = {&model_searches_.Add({{"model", id}}), &model_found_.Add({{"model", id}})};
+    entry->second.searches->Increment();
+  }
+  for (const v1::PoseHypothesis& hypothesis : response.hypotheses()) {
+    model_series_.at(hypothesis.model_id()).found->Increment();
+  }
+}
+
+void Metrics::keep_models(const std::set<std::string>& ids) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(model_series_, [&](const auto& entry) {
+    if (ids.contains(entry.first)) return false;
+    model_searches_.Remove(entry.second.searches);
+    model_found_.Remove(entry.second.found);
+    return true;
+  });
 }
 
 void Metrics::count_refusal(const absl::Status& status) {

@@ -1,12 +1,17 @@
 #pragma once
 
 #include <prometheus/counter.h>
+#include <prometheus/family.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 
 #include <array>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <set>
+#include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
@@ -17,7 +22,8 @@ namespace binpose::server {
 /// The methods that are measured.
 enum class Method { kTrain, kGetModel, kGetModelShape, kListModels, kDeleteModel, kExportModel, kImportModel, kDetect };
 
-/// What the server tells about itself at /metrics. Thread-safe; nothing is looked up by name after construction.
+/// What the server tells about itself at /metrics. Thread-safe; only the series of models are looked up by name after
+/// construction.
 class Metrics {
  public:
   Metrics();
@@ -26,6 +32,13 @@ class Metrics {
   void count_request(Method method, absl::StatusCode code, double seconds);
   /// Notes where a detection spent its time.
   void observe_detection(const v1::DetectStats& stats, std::size_t hypotheses);
+  /// Counts for each of the models that it was searched for, and what was found of it.
+  void count_search(const google::protobuf::RepeatedPtrField<std::string>& model_ids,
+                    const v1::DetectResponse& response);
+  /// Drops the series of all models but these.
+  void keep_models(const std::set<std::string>& ids);
+  /// Notes a training that ended well; without the time that it waited.
+  void observe_training(double seconds) { train_seconds_.Observe(seconds); }
   /// Notes a request that was refused; does nothing unless refused() made `status`.
   void count_refusal(const absl::Status& status);
   /// Notes how long after its cancel a request ended, and whether in "queue", "compute" or "training".
@@ -51,6 +64,7 @@ class Metrics {
   std::array<prometheus::Histogram*, kMethods> request_seconds_;
   std::array<prometheus::Histogram*, kStages> stage_seconds_;
   prometheus::Histogram& queue_seconds_;
+  prometheus::Histogram& train_seconds_;
   std::array<prometheus::Counter*, 3> refusals_;
   prometheus::Histogram& queue_cancel_seconds_;
   prometheus::Histogram& compute_cancel_seconds_;
@@ -65,6 +79,15 @@ class Metrics {
   prometheus::Gauge& resident_bytes_;
   prometheus::Gauge& streams_;
   prometheus::Counter& skipped_model_files_;
+
+  struct ModelSeries {
+    prometheus::Counter* searches;
+    prometheus::Counter* found;
+  };
+  prometheus::Family<prometheus::Counter>& model_searches_;
+  prometheus::Family<prometheus::Counter>& model_found_;
+  std::mutex mutex_;  ///< guards what follows
+  std::map<std::string, ModelSeries> model_series_;
 };
 
 }  // namespace binpose::server

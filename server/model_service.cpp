@@ -50,13 +50,12 @@ absl::Status delete_model(const Backend& backend, const std::string& id) {
 
 grpc::ServerWriteReactor<v1::TrainResponse>* ModelService::Train(grpc::CallbackServerContext* context,
                                                                  const v1::TrainRequest* request) {
-  return new TrainCall(*request, backend_, backend_.tokens.check(*context, Role::kTrain),
-                       compute_deadline(context->deadline()), trace_id_of(*context));
+  return new TrainCall(*request, backend_, *context, backend_.tokens.check(*context, Role::kTrain));
 }
 
 grpc::ServerWriteReactor<v1::ExportModelResponse>* ModelService::ExportModel(grpc::CallbackServerContext* context,
                                                                              const v1::ExportModelRequest* request) {
-  return new ExportCall(request->id(), backend_, backend_.tokens.check(*context, Role::kTrain));
+  return new ExportCall(request->id(), backend_, *context, backend_.tokens.check(*context, Role::kTrain));
 }
 
 grpc::ServerReadReactor<v1::ImportModelRequest>* ModelService::ImportModel(grpc::CallbackServerContext* context,
@@ -79,8 +78,9 @@ grpc::ServerUnaryReactor* ModelService::GetModelShape(grpc::CallbackServerContex
                                                       v1::GetModelShapeResponse* response) {
   const Clock::time_point arrival = Clock::now();
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  finish(reactor, backend_.metrics, Method::kGetModelShape, arrival,
-         get_model_shape(backend_.models, request->id(), *response));
+  absl::Status status = backend_.tokens.check(*context, Role::kDetect);
+  if (status.ok()) status = get_model_shape(backend_.models, request->id(), *response);
+  finish(reactor, backend_.metrics, Method::kGetModelShape, arrival, status);
   return reactor;
 }
 

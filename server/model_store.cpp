@@ -64,6 +64,7 @@ absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::open(const std::filesyst
     return absl::InternalError(
         absl::StrFormat("Cannot use %s as the model directory: %s.", directory.string(), error.message()));
   }
+  remove_leftovers(directory, kSuffix);
   std::unique_ptr<ModelStore> store(new ModelStore(directory, limits));
   store->follow_directory(limits.load_threads);
   store->watcher_ = std::jthread([&store = *store](const std::stop_token& stop) { store.watch(stop); });

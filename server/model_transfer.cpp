@@ -17,8 +17,9 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
 
 }  // namespace
 
-ExportCall::ExportCall(const std::string& id, const Backend& backend, const absl::Status& allowed)
-    : backend_(backend), call_(backend.drain) {
+ExportCall::ExportCall(const std::string& id, const Backend& backend, grpc::CallbackServerContext& context,
+                       const absl::Status& allowed)
+    : backend_(backend), context_(context), call_(backend.drain) {
   absl::Status status = allowed;
   if (status.ok() && backend_.drain.started()) status = absl::UnavailableError(kEnding);
   if (status.ok()) {
@@ -43,10 +44,14 @@ void ExportCall::write_next() {
   const std::size_t count = std::min(kPieceBytes, bytes_.size() - sent_);
   outgoing_.set_data(bytes_.substr(sent_, count));
   sent_ += count;
+  backend_.writes.begin(context_);
   StartWrite(&outgoing_);
 }
 
-void ExportCall::OnWriteDone(bool ok) { ok ? write_next() : end(absl::CancelledError("The caller is gone.")); }
+void ExportCall::OnWriteDone(bool ok) {
+  backend_.writes.end(context_);
+  ok ? write_next() : end(absl::CancelledError("The caller is gone."));
+}
 
 void ExportCall::end(const absl::Status& status) {
   backend_.metrics.count_request(Method::kExportModel, status.code(), seconds_since(arrival_));

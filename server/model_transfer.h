@@ -16,7 +16,8 @@ namespace binpose::server {
 class ExportCall final : public grpc::ServerWriteReactor<v1::ExportModelResponse> {
  public:
   /// @param allowed  an error ends the call with it.
-  ExportCall(const std::string& id, const Backend& backend, const absl::Status& allowed);
+  ExportCall(const std::string& id, const Backend& backend, grpc::CallbackServerContext& context,
+             const absl::Status& allowed);
 
   void OnWriteDone(bool ok) override;
   void OnDone() override { delete this; }
@@ -27,6 +28,7 @@ class ExportCall final : public grpc::ServerWriteReactor<v1::ExportModelResponse
   void end(const absl::Status& status);
 
   Backend backend_;
+  grpc::CallbackServerContext& context_;
   const Clock::time_point arrival_ = Clock::now();
   std::string bytes_;
   std::size_t sent_ = 0;

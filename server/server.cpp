@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -69,6 +70,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const Config& config) {
 
 Server::Server(const Config& config)
     : config_(config),
+      writes_(std::chrono::seconds(config.write_timeout_seconds)),
       requests_(static_cast<std::size_t>(config.request_memory_mib) << 20),
       detections_("detections", config.threads, static_cast<std::size_t>(config.queue)),
       trainings_("trainings", 1, kTrainingQueue, ComputePool::Priority::kLow) {}
@@ -85,7 +87,7 @@ absl::Status Server::load() {
       {.total_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20, .load_threads = config_.threads});
   if (!models.ok()) return models.status();
   models_ = *std::move(models);
-  const Backend backend = {*models_, detections_, trainings_, requests_, tokens_, metrics_, drain_};
+  const Backend backend = {*models_, detections_, trainings_, requests_, tokens_, metrics_, drain_, writes_};
   model_service_ = std::make_unique<ModelService>(backend);
   detection_service_ = std::make_unique<DetectionService>(backend);
   return absl::OkStatus();
@@ -110,6 +112,9 @@ void Server::update_metrics() {
   metrics_.resident_bytes().Set(resident_bytes());
   if (!is_ready_) return;
   metrics_.models().Set(static_cast<double>(models_->size()));
+  std::set<std::string> served;
+  for (const auto& model : models_->list()) served.insert(model->id);
+  metrics_.keep_models(served);
   metrics_.model_bytes().Set(static_cast<double>(models_->total_bytes()));
   prometheus::Counter& skipped = metrics_.skipped_model_files();
   skipped.Increment(std::max(0.0, static_cast<double>(models_->skipped_files()) - skipped.Value()));

@@ -41,6 +41,7 @@ class Server {
   const Config config_;
   Metrics metrics_;
   Drain drain_;
+  WriteWatch writes_;
   MemoryBudget requests_;
   Tokens tokens_;
   std::unique_ptr<ModelStore> models_;

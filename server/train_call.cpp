@@ -18,9 +18,14 @@ constexpr double kComputeShare = 0.95;
 
 }  // namespace
 
-TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, const absl::Status& allowed,
-                     std::optional<Clock::time_point> deadline, std::string trace_id)
-    : request_(request), backend_(backend), deadline_(deadline), trace_id_(std::move(trace_id)), call_(backend.drain) {
+TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, grpc::CallbackServerContext& context,
+                     const absl::Status& allowed)
+    : request_(request),
+      backend_(backend),
+      context_(context),
+      deadline_(compute_deadline(context.deadline())),
+      trace_id_(trace_id_of(context)),
+      call_(backend.drain) {
   if (const absl::Status admitted = admit(allowed); !admitted.ok()) {
     backend_.metrics.count_refusal(admitted);
     end(admitted);
@@ -44,13 +49,16 @@ void TrainCall::OnCancel() {
 }
 
 void TrainCall::OnWriteDone(bool /*ok*/) {
+  backend_.writes.end(context_);
   advance([this] { writing_ = false; });
 }
 
 void TrainCall::run() {
   const LogTrace log_trace(trace_id_);
+  const Clock::time_point start = Clock::now();
   const absl::StatusOr<v1::Model> outcome = contain_exceptions([this] { return train_and_save(); });
   if (outcome.ok()) {
+    backend_.metrics.observe_training(seconds_since(start));
     spdlog::info("trained {} generation {} in {:.2f} s", outcome->id(), outcome->generation(), seconds_since(arrival_));
   } else {
     log_failure("training of " + request_.id(), outcome.status());
@@ -66,7 +74,7 @@ absl::StatusOr<v1::Model> TrainCall::train_and_save() {
   const absl::StatusOr<TrainParams> params = to_train_params(request_.params());
   if (!params.ok()) return params.status();
   report(v1::TRAIN_STAGE_READING_MESH, 0);
-  const absl::StatusOr<Mesh> mesh = to_mesh(request_.mesh());
+  const absl::StatusOr<Mesh> mesh = to_mesh(request_.mesh(), control);
   if (!mesh.ok()) return mesh.status();
 
   absl::StatusOr<Model> model = train(*mesh, *params, control, [this](TrainStage stage, double progress) {
@@ -120,7 +128,10 @@ void TrainCall::advance(Change change) {
       finish = finished_ = true;
     }
   }
-  if (write) StartWrite(&outgoing_);
+  if (write) {
+    backend_.writes.begin(context_);
+    StartWrite(&outgoing_);
+  }
   if (finish) Finish(*end_);
 }
 

@@ -18,11 +18,10 @@ namespace binpose::server {
 /// One Train call: trains on the pool, reports progress, saves. Deletes itself when the call is over.
 class TrainCall final : public grpc::ServerWriteReactor<v1::TrainResponse> {
  public:
-  /// @param request   lives until OnDone().
-  /// @param allowed   an error ends the call with it.
-  /// @param trace_id  goes into the log.
-  TrainCall(const v1::TrainRequest& request, const Backend& backend, const absl::Status& allowed,
-            std::optional<Clock::time_point> deadline, std::string trace_id);
+  /// @param request  lives until OnDone(), as does `context`.
+  /// @param allowed  an error ends the call with it.
+  TrainCall(const v1::TrainRequest& request, const Backend& backend, grpc::CallbackServerContext& context,
+            const absl::Status& allowed);
 
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
@@ -39,6 +38,7 @@ class TrainCall final : public grpc::ServerWriteReactor<v1::TrainResponse> {
 
   const v1::TrainRequest& request_;
   Backend backend_;
+  grpc::CallbackServerContext& context_;
   const std::optional<Clock::time_point> deadline_;
   const Clock::time_point arrival_ = Clock::now();
   const std::string trace_id_;

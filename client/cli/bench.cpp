@@ -34,6 +34,7 @@ void print_report(const LoadReport& report, const LoadPlan& plan) {
   table.push_back(row("due to answer", report.latency));
   table.push_back(row("server's queue", report.queue));
   table.push_back(row("server's computing", report.computation));
+  table.push_back(row("all but computing", report.overhead));
   print(table, std::cout);
   if (report.unsent > 0) {
     std::cout << coloured(std::to_string(report.unsent) + " x ", Colour::kRed, stdout)
@@ -58,7 +59,7 @@ void print_json(const LoadReport& report) {
             << ",\"failed\":" << failed << ",\"seconds\":" << report.seconds
             << ",\"answersPerSecond\":" << per_second(report) << ",\"latencySeconds\":" << json_of(report.latency)
             << ",\"queueSeconds\":" << json_of(report.queue) << ",\"totalSeconds\":" << json_of(report.computation)
-            << "}" << std::endl;
+            << ",\"overheadSeconds\":" << json_of(report.overhead) << "}" << std::endl;
 }
 
 ExitCode bench(BenchOptions& options, const GlobalOptions& global) {

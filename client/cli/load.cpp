@@ -69,7 +69,8 @@ class StreamLoad {
       const std::optional<v1::DetectResponse> answer = stream_->read();
       if (!answer.has_value()) return;
       report_.seconds = seconds_between(start_, Clock::now());
-      report_.latency.record(seconds_between(due(i), Clock::now()));
+      const double latency = seconds_between(due(i), Clock::now());
+      report_.latency.record(latency);
       if (absl::Status error = frame_error(*answer); !error.ok()) {
         ++report_.errors[std::string(error.message())];
         continue;
@@ -77,6 +78,7 @@ class StreamLoad {
       ++report_.answered;
       report_.queue.record(answer->stats().queue_seconds());
       report_.computation.record(answer->stats().total_seconds());
+      report_.overhead.record(latency - answer->stats().total_seconds());
     }
   }
 
@@ -109,6 +111,7 @@ LoadReport run_load(const LoadPlan& plan, Client& client) {
     sum.latency.add(part.latency);
     sum.queue.add(part.queue);
     sum.computation.add(part.computation);
+    sum.overhead.add(part.overhead);
   }
   return sum;
 }

@@ -30,6 +30,7 @@ struct LoadReport {
   Histogram latency;                            ///< from when a scan was due to its answer: a late start counts
   Histogram queue;                              ///< what the server says of its queue
   Histogram computation;                        ///< and of its computing
+  Histogram overhead;  ///< from when a scan was due to its answer, less computing: wire, queue, decoding
 };
 
 /// Runs the plan; returns when every scan that was sent has its answer or its stream has ended.

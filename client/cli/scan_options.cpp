@@ -26,6 +26,8 @@ void add_search_options(CLI::App& command, ScanOptions& options) {
                      "Largest angle between alike normals of scene and model, degrees");
   command.add_flag("--keep-support-plane", options.keep_support_plane,
                    "Search the plane that the parts lie on as well, instead of leaving it out");
+  command.add_option("--time-budget", options.time_budget,
+                     "Seconds after which the server answers the best that it has found so far");
 }
 
 std::string request_id_of(const std::string& scene) {
@@ -48,6 +50,7 @@ absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const
     params.set_normal_tolerance_degrees(*options.normal_tolerance_degrees);
   }
   if (options.keep_support_plane) params.set_remove_support_plane(false);
+  if (options.time_budget.has_value()) request.set_time_budget_seconds(*options.time_budget);
   return request;
 }
 

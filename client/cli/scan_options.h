@@ -22,6 +22,7 @@ struct ScanOptions {
   std::optional<double> start_point_share;
   std::optional<double> normal_tolerance_degrees;
   bool keep_support_plane = false;
+  std::optional<double> time_budget;  ///< seconds
 };
 
 /// The options of every search but --scene.

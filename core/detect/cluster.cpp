@@ -76,11 +76,11 @@ struct KeyedVote {
   std::uint32_t vote;
 };
 
-/// Sorts by key, equal keys in their order.
-void radix_sort(std::vector<KeyedVote>& keyed, int bits) {
+/// Sorts by key, equal keys in their order; not to the end when stopped.
+void radix_sort(std::vector<KeyedVote>& keyed, int bits, const RunControl& control) {
   constexpr int kDigit = 11;
   std::vector<KeyedVote> other(keyed.size());
-  for (int shift = 0; shift < bits; shift += kDigit) {
+  for (int shift = 0; shift < bits && !control.stop.stop_requested(); shift += kDigit) {
     std::array<std::uint32_t, (1 << kDigit) + 1> first = {};
     for (const KeyedVote& k : keyed) ++first[(k.key >> shift & ((1 << kDigit) - 1)) + 1];
     std::partial_sum(first.begin(), first.end(), first.begin());
@@ -95,7 +95,8 @@ void add(Cell& cell, float weight, const Eigen::Vector3f& centre, const Eigen::V
   cell.quaternion += (cell.quaternion.dot(quaternion) < 0 ? -weight : weight) * quaternion;
 }
 
-std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cell_of) {
+/// The cells that have votes, by key; none when stopped.
+std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cell_of, const RunControl& control) {
   std::vector<KeyedVote> keyed(votes.size());
   for (std::size_t i = 0; i < votes.size(); ++i) {
     const RotationCoordinates rotation(votes[i].q_view_model);
@@ -103,7 +104,8 @@ std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cel
                     CellOf::rotation_key(rotation.largest, rotation.rest.cast<int>()),
                 static_cast<std::uint32_t>(i)};
   }
-  radix_sort(keyed, cell_of.key_bits());
+  radix_sort(keyed, cell_of.key_bits(), control);
+  if (control.stop.stop_requested()) return {};
   std::vector<Cell> cells;
   for (const KeyedVote& k : keyed) {
     if (cells.empty() || cells.back().key != k.key) {
@@ -243,10 +245,12 @@ std::vector<PoseCluster> thin_out(const std::vector<PoseCluster>& clusters, cons
 
 }  // namespace
 
-std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterOptions& options) {
+std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterOptions& options,
+                                 const RunControl& control) {
   if (votes.empty()) return {};
   const CellOf cell_of(votes, options.radius);
-  const std::vector<Cell> cells = sum_by_cell(votes, cell_of);
+  const std::vector<Cell> cells = sum_by_cell(votes, cell_of, control);
+  if (control.stop.stop_requested()) return {};
 
   std::vector<std::uint32_t> seeds(cells.size());
   std::iota(seeds.begin(), seeds.end(), 0);
@@ -258,6 +262,7 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   const CellIndex index(cells);
   std::vector<PoseCluster> merged;
   for (std::size_t i = 0; i < seed_count; ++i) {
+    if (control.stop.stop_requested()) return {};
     merged.push_back(with_neighbours(cells, index, seeds[i], cell_of, options));
   }
   std::stable_sort(merged.begin(), merged.end(),

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/detect/vote.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -27,7 +28,9 @@ struct ClusterOptions {
 /// Clusters of whole poses, most votes first [paper, section IV 4].
 ///
 /// Votes are binned by centre and rotation; the bins of most votes are merged with their neighbours, averaged, and kept
-/// unless they repeat a stronger one or `most_per_neighbourhood` stronger ones lie around. Deterministic.
-std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterOptions& options);
+/// unless they repeat a stronger one or `most_per_neighbourhood` stronger ones lie around. Deterministic. Empty when
+/// stopped.
+std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterOptions& options,
+                                 const RunControl& control = {});
 
 }  // namespace binpose

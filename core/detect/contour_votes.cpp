@@ -124,6 +124,7 @@ Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& c
       match_point(grid, a, static_cast<int>(std::min(pixels / kBlock, 1e6)) + 1, model, partners, parts[task]);
     }
   });
+  if (control.stop.stop_requested()) return {};
   return concatenate(parts);
 }
 

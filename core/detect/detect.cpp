@@ -19,15 +19,15 @@ constexpr double kPixelPerSpacing = 1.2;
 constexpr float kContourStep = 0.03F;
 
 /// Normals from the smallest windows that the noise allows: wide ones round off edges.
-void estimate_steady_normals(DepthMap& map, int threads) {
+void estimate_steady_normals(DepthMap& map, const RunControl& control) {
   constexpr int kWidest = 3;
   constexpr double kNormalError = 4 * kDegree;
-  estimate_normals(map, 1, threads);
+  estimate_normals(map, 1, control);
   const float noise = map.noise;
   int radius = 1;
   while (radius < kWidest && normal_error(noise, map.pixel_size, radius) > kNormalError) ++radius;
   if (radius == 1) return;
-  estimate_normals(map, radius, threads);
+  estimate_normals(map, radius, control);
   map.noise = noise;
 }
 
@@ -35,11 +35,11 @@ void estimate_steady_normals(DepthMap& map, int threads) {
 DepthMap prepare(const SensorView& view, const Model& model, const DetectParams& params, const RunControl& control,
                  DetectStats& stats) {
   const StageTimer timer(stats.preprocess_seconds);
-  DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing));
-  if (view.normals.empty()) estimate_steady_normals(map, control.threads);
+  DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing), control);
+  if (view.normals.empty()) estimate_steady_normals(map, control);
+  if (control.interrupted()) return map;
   if (params.remove_support_plane) mark_support_plane(map, static_cast<float>(model.diameter));
-  if (control.stop.stop_requested()) return map;
-  find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control.threads);
+  find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control);
   return map;
 }
 
@@ -82,7 +82,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   const auto start = std::chrono::steady_clock::now();
   if (absl::Status status = validate(params); !status.ok()) return status;
   if (models.empty()) return absl::InvalidArgumentError("models is empty; it must name at least 1.");
-  const absl::StatusOr<SensorView> view = sensor_view(cloud);
+  const absl::StatusOr<SensorView> view = sensor_view(cloud, control);
   if (!view.ok()) return view.status();
   DetectResult result;
   DetectStats& stats = result.stats;
@@ -92,8 +92,10 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   std::vector<Candidate> candidates;
   std::vector<VerifyOptions> verification;
   for (std::size_t m = 0; m < models.size() && !control.stop.stop_requested(); ++m) {
-    DepthMap map = prepare(*view, *models[m], params, control, stats);
-    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, control, stats);
+    const RunControl turn = control.with_share_of_time(1.0 / static_cast<double>(models.size() - m));
+    DepthMap map = prepare(*view, *models[m], params, turn, stats);
+    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, turn, stats);
+    if (turn.past_deadline()) stats.stop_reason = StopReason::kDeadline;
     candidates.insert(candidates.end(), found.begin(), found.end());
     verification.push_back(final_verification(map, *models[m]));
     if (m == 0 || map.pixel_size < finest.pixel_size) finest = std::move(map);

@@ -41,6 +41,10 @@ constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
 constexpr float kAlignmentCutoff = 0.1F;
 
+// Of the time left before a deadline: votes that nobody has the time to verify are worth nothing.
+constexpr double kSurfaceVotesShare = 0.25;
+constexpr double kContourVotesShare = 0.25;
+
 Eigen::Isometry3f pose_of(const PoseCluster& cluster, const Model& model) {
   Eigen::Isometry3f T_view_model(cluster.q_view_model);
   T_view_model.translation() = cluster.centre - T_view_model.linear() * model.centre.cast<float>();
@@ -109,7 +113,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
     options.neighbourhood = kNeighbourhood * diameter;
     options.most_per_neighbourhood = kClustersPerNeighbourhood;
     options.most = params.cluster_limit;
-    for (const PoseCluster& c : cluster(votes.votes, options)) {
+    for (const PoseCluster& c : cluster(votes.votes, options, control)) {
       Candidate candidate;
       candidate.model_index = model_index;
       candidate.T_view_model = pose_of(c, model);
@@ -197,10 +201,14 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
   Votes by_surface, by_contour;
   {
     const StageTimer timer(stats.vote_seconds);
-    by_surface = surface_votes(map, model, params, control, stats);
-    if (params.use_contours) by_contour = contour_votes(map, model, control);
+    const RunControl first = control.with_share_of_time(kSurfaceVotesShare);
+    by_surface = surface_votes(map, model, params, first, stats);
+    const RunControl second = control.with_share_of_time(kContourVotesShare);
+    if (params.use_contours) by_contour = contour_votes(map, model, second);
+    if (first.past_deadline() || second.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   }
   // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
+  if (control.stop.stop_requested()) return {};
   std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, params, control, stats);
   const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, params, control, stats);
   candidates.insert(candidates.end(), more.begin(), more.end());

@@ -178,11 +178,13 @@ Votes vote(const ScenePoints& scene, std::span<const int> starts, const DepthMap
   const int tasks = (static_cast<int>(starts.size()) + kStartsPerTask - 1) / kStartsPerTask;
   std::vector<Votes> parts(tasks);
   parallel_for(tasks, control.threads, [&](int task) {
-    if (control.interrupted()) return;
     PairMatcher matcher(scene, map, model, params);
     const std::size_t last = std::min<std::size_t>(starts.size(), (task + 1) * kStartsPerTask);
-    for (std::size_t i = task * kStartsPerTask; i < last; ++i) matcher.match(starts[i], parts[task]);
+    for (std::size_t i = task * kStartsPerTask; i < last && !control.interrupted(); ++i) {
+      matcher.match(starts[i], parts[task]);
+    }
   });
+  if (control.stop.stop_requested()) return {};
   return concatenate(parts);
 }
 

@@ -49,9 +49,10 @@ Eigen::Vector2f outward_at(const DepthMap& map, int u, int v, float step, Unmeas
 
 }  // namespace
 
-void find_contours(DepthMap& map, float step, Unmeasured unmeasured, int threads) {
+void find_contours(DepthMap& map, float step, Unmeasured unmeasured, const RunControl& control) {
   std::vector<Eigen::Vector2f> outward(map.points.size(), Eigen::Vector2f::Zero());
-  parallel_for(map.height, threads, [&](int v) {
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (control.interrupted()) return;
     for (int u = 0; u < map.width; ++u) {
       const int i = v * map.width + u;
       if (!map.has_normal(i)) continue;

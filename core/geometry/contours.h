@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/geometry/depth_map.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -15,6 +16,7 @@ enum class Unmeasured {
 /// A measured pixel with a normal is one when, in some of the 8 directions, the next measured pixel (over gaps of a few
 /// pixels) lies more than `step` behind its tangent plane. Nearer neighbours are occluders, not ends of the surface.
 /// @param step  metres.
-void find_contours(DepthMap& map, float step, Unmeasured unmeasured, int threads);
+/// Ends early, with points left out, when `control` interrupts.
+void find_contours(DepthMap& map, float step, Unmeasured unmeasured, const RunControl& control = {});
 
 }  // namespace binpose

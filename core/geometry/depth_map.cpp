@@ -102,9 +102,9 @@ Eigen::Vector3f between_neighbours(const DepthMap& map, int u, int v) {
 }
 
 /// Scattered points leave single pixels empty that lie on a surface all the same.
-void fill_specks(DepthMap& map) {
+void fill_specks(DepthMap& map, const RunControl& control) {
   std::vector<std::pair<int, Eigen::Vector3f>> filled;
-  for (int v = 0; v < map.height; ++v) {
+  for (int v = 0; v < map.height && !control.interrupted(); ++v) {
     for (int u = 0; u < map.width; ++u) {
       const int i = v * map.width + u;
       if (map.measured(i)) continue;
@@ -117,11 +117,13 @@ void fill_specks(DepthMap& map) {
 
 }  // namespace
 
-absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
+absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl& control) {
   if (absl::Status status = check_cloud(cloud); !status.ok()) return status;
+  const auto stopped = [&](std::size_t i) { return i % 1024 == 0 && control.stop.stop_requested(); };
   const Eigen::Vector3f sensor = cloud.sensor_position.cast<float>();
   Eigen::Vector3d direction = viewing_direction(cloud.points, sensor, 1 + cloud.points.size() / kEnoughForDirection);
   if (!(direction.norm() > 0)) direction = viewing_direction(cloud.points, sensor, 1);
+  if (control.stop.stop_requested()) return control.status();
   if (!(direction.norm() > 0)) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "cloud has no measurement among its %d points; at least one must have finite x, y, z away from the sensor.",
@@ -135,6 +137,7 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
   const Eigen::Matrix3f R_view_scene = view.T_scene_view.linear().transpose().cast<float>();
   view.points.reserve(cloud.points.size());
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (stopped(i)) return control.status();
     const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
     if (!p.allFinite() || !(p.z() > 1e-6F) || std::max(std::abs(p.x()), std::abs(p.y())) > kWidestTangent * p.z()) {
       continue;
@@ -148,12 +151,14 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud) {
                         "was measured from.",
                         cloud.sensor_position.x(), cloud.sensor_position.y(), cloud.sensor_position.z()));
   }
+  if (control.stop.stop_requested()) return control.status();
   view.median_depth = median_depth(view.points);
+  if (control.stop.stop_requested()) return control.status();
   view.spacing = point_spacing(view.points, view.median_depth);
   return view;
 }
 
-DepthMap depth_map(const SensorView& view, double pixel_size) {
+DepthMap depth_map(const SensorView& view, double pixel_size, const RunControl& control) {
   const Window window(view.points);
   const double width_tan = window.high_x - window.low_x, height_tan = window.high_y - window.low_y;
   double pixel_tan = pixel_size / view.median_depth;
@@ -172,7 +177,8 @@ DepthMap depth_map(const SensorView& view, double pixel_size) {
   map.points.assign(count, Eigen::Vector3f::Zero());
   map.normals.assign(count, Eigen::Vector3f::Zero());
   map.background.assign(count, 0);
-  for (std::size_t i = 0; i < view.points.size(); ++i) {
+  if (control.interrupted()) return map;
+  for (std::size_t i = 0; i < view.points.size() && !control.interrupted_at(i); ++i) {
     const int pixel = map.pixel_of(view.points[i]);
     if (pixel < 0 || (map.measured(pixel) && map.points[pixel].z() <= view.points[i].z())) continue;
     map.points[pixel] = view.points[i];
@@ -182,7 +188,7 @@ DepthMap depth_map(const SensorView& view, double pixel_size) {
     map.normals[pixel] =
         n.allFinite() && n.norm() > 0.5F ? Eigen::Vector3f(sign * n.normalized()) : Eigen::Vector3f::Zero();
   }
-  if (view.normals.empty()) fill_specks(map);
+  if (view.normals.empty()) fill_specks(map, control);
   return map;
 }
 

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "core/geometry/point_cloud.h"
 #include "core/geometry/pose.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -55,11 +56,11 @@ struct SensorView {
 };
 
 /// Errors: INVALID_ARGUMENT when width x height does not fit the points, when no point is finite, or when none lies in
-/// front of the sensor.
-absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud);
+/// front of the sensor; CANCELLED.
+absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl& control = {});
 
 /// Projects the points to pixels of `pixel_size` metres at the median depth (or larger ones, so that the image has at
-/// most 4 million). Normals that came with the cloud are kept, otherwise none are set.
-DepthMap depth_map(const SensorView& view, double pixel_size);
+/// most 4 million). Normals that came with the cloud are kept, otherwise none are set. A stop leaves pixels unmeasured.
+DepthMap depth_map(const SensorView& view, double pixel_size, const RunControl& control = {});
 
 }  // namespace binpose

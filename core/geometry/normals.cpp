@@ -137,10 +137,13 @@ double normal_error(double noise, double pixel_size, int radius) {
   return noise / (pixel_size * std::sqrt(sum_sq_offset));
 }
 
-void estimate_normals(DepthMap& map, int radius, int threads) {
+void estimate_normals(DepthMap& map, int radius, const RunControl& control) {
   std::vector<float> deviations(map.points.size(), -1);
   const RayImage rays(map, radius);
-  parallel_for(map.height, threads, [&](int v) { fit_row(map, rays, v, radius, deviations); });
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (!control.interrupted()) fit_row(map, rays, v, radius, deviations);
+  });
+  if (control.interrupted()) return;
   map.noise = noise_of(std::move(deviations));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/geometry/depth_map.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -9,8 +10,8 @@ namespace binpose {
 /// more than 80 degrees get no normal. Also sets the map's noise, from the windows that are most nearly plane.
 ///
 /// @param radius  of the window, pixels: 1 = 3 x 3.
-/// Deterministic on any number of threads.
-void estimate_normals(DepthMap& map, int radius, int threads);
+/// Deterministic on any number of threads. Ends early, with pixels left out, when `control` interrupts.
+void estimate_normals(DepthMap& map, int radius, const RunControl& control = {});
 
 /// Standard deviation of a normal about one axis that a plane fit over a window leaves, radians; lengths in metres.
 double normal_error(double noise, double pixel_size, int radius);

@@ -209,9 +209,10 @@ absl::Status PlyBody::read_row(const PlyElement& element, std::optional<std::siz
   return absl::OkStatus();
 }
 
-absl::Status PlyBody::skip_rows(const PlyElement& element) {
+absl::Status PlyBody::skip_rows(const PlyElement& element, const RunControl& control) {
   PlyRow row;
   for (std::size_t i = 0; i < element.row_count; ++i) {
+    if (control.interrupted_at(i)) return control.status();
     if (absl::Status status = read_row(element, std::nullopt, row); !status.ok()) return status;
   }
   return absl::OkStatus();

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/io/text_cursor.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -61,7 +62,7 @@ class PlyBody {
   absl::Status read_row(const PlyElement& element, std::optional<std::size_t> list, PlyRow& row);
 
   /// Takes all rows of an element that nobody wants.
-  absl::Status skip_rows(const PlyElement& element);
+  absl::Status skip_rows(const PlyElement& element, const RunControl& control);
 
  private:
   std::optional<double> next_number(PlyType type);

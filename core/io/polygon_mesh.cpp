@@ -87,7 +87,8 @@ class VertexMerger {
 
 }  // namespace
 
-absl::StatusOr<Mesh> triangulate(const PolygonMesh& polygons, double scale, std::size_t max_triangles) {
+absl::StatusOr<Mesh> triangulate(const PolygonMesh& polygons, double scale, std::size_t max_triangles,
+                                 const RunControl& control) {
   if (polygons.corner_counts.empty()) return absl::InvalidArgumentError("The mesh has no face.");
   if (absl::Status status = check_vertices(polygons.vertices); !status.ok()) return status;
   Mesh mesh;
@@ -97,6 +98,7 @@ absl::StatusOr<Mesh> triangulate(const PolygonMesh& polygons, double scale, std:
   for (std::size_t face = 0; face < polygons.corner_counts.size(); ++face) {
     const Corners corners = Corners(polygons.corners).subspan(first, polygons.corner_counts[face]);
     first += corners.size();
+    if (control.interrupted_at(face)) return control.status();
     if (absl::Status status = check_face(face, corners, polygons.vertices.size()); !status.ok()) return status;
     const std::optional<std::size_t> start = find_fan_start(polygons.vertices, corners);
     if (!start.has_value()) {

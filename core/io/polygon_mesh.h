@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/geometry/mesh.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -25,7 +26,9 @@ inline constexpr std::size_t kMaxCorners = 255;
 ///
 /// @param scale  of the coordinates, for example 0.001 metres per unit.
 /// Errors: INVALID_ARGUMENT (no face; a coordinate that is not finite; a face with fewer than 3 corners, with a vertex
-/// that does not exist, or that no fan of triangles can fill), RESOURCE_EXHAUSTED (more than `max_triangles`).
-absl::StatusOr<Mesh> triangulate(const PolygonMesh& polygons, double scale, std::size_t max_triangles);
+/// that does not exist, or that no fan of triangles can fill), RESOURCE_EXHAUSTED (more than `max_triangles`); or what
+/// `control` says.
+absl::StatusOr<Mesh> triangulate(const PolygonMesh& polygons, double scale, std::size_t max_triangles,
+                                 const RunControl& control = {});
 
 }  // namespace binpose

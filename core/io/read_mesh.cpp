@@ -31,16 +31,17 @@ absl::StatusOr<MeshFormat> detect_format(std::string_view bytes) {
                       in_quotes(bytes.substr(0, 16))));
 }
 
-absl::StatusOr<PolygonMesh> read_polygons(std::string_view bytes, MeshFormat format, std::size_t max_triangles) {
-  if (format == MeshFormat::kStl) return read_stl(bytes, max_triangles);
-  if (format == MeshFormat::kPly) return read_ply_mesh(bytes, max_triangles);
-  return read_obj(bytes, max_triangles);
+absl::StatusOr<PolygonMesh> read_polygons(std::string_view bytes, MeshFormat format, std::size_t max_triangles,
+                                          const RunControl& control) {
+  if (format == MeshFormat::kStl) return read_stl(bytes, max_triangles, control);
+  if (format == MeshFormat::kPly) return read_ply_mesh(bytes, max_triangles, control);
+  return read_obj(bytes, max_triangles, control);
 }
 
 }  // namespace
 
 absl::StatusOr<Mesh> read_mesh(std::string_view bytes, MeshFormat format, double metres_per_unit,
-                               const MeshLimits& limits) {
+                               const MeshLimits& limits, const RunControl& control) {
   if (bytes.empty()) return absl::InvalidArgumentError("The mesh is empty: it has 0 bytes.");
   if (bytes.size() > limits.max_bytes) {
     return absl::ResourceExhaustedError(
@@ -51,9 +52,9 @@ absl::StatusOr<Mesh> read_mesh(std::string_view bytes, MeshFormat format, double
     if (!detected.ok()) return detected.status();
     format = *detected;
   }
-  const absl::StatusOr<PolygonMesh> polygons = read_polygons(bytes, format, limits.max_triangles);
+  const absl::StatusOr<PolygonMesh> polygons = read_polygons(bytes, format, limits.max_triangles, control);
   if (!polygons.ok()) return polygons.status();
-  return triangulate(*polygons, metres_per_unit, limits.max_triangles);
+  return triangulate(*polygons, metres_per_unit, limits.max_triangles, control);
 }
 
 }  // namespace binpose

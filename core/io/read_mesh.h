@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/geometry/mesh.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -25,8 +26,8 @@ struct MeshLimits {
 /// @param bytes            the file; hostile.
 /// @param metres_per_unit  1 or 0.001.
 /// Errors, each naming the value and the limit: INVALID_ARGUMENT (empty, truncated, unknown format, no triangle, a
-/// coordinate that is not finite, an index out of range), RESOURCE_EXHAUSTED (over a limit).
+/// coordinate that is not finite, an index out of range), RESOURCE_EXHAUSTED (over a limit); or what `control` says.
 absl::StatusOr<Mesh> read_mesh(std::string_view bytes, MeshFormat format, double metres_per_unit,
-                               const MeshLimits& limits = {});
+                               const MeshLimits& limits = {}, const RunControl& control = {});
 
 }  // namespace binpose

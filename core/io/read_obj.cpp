@@ -52,10 +52,11 @@ absl::Status read_face(TextCursor words, PolygonMesh& mesh) {
 
 }  // namespace
 
-absl::StatusOr<PolygonMesh> read_obj(std::string_view bytes, std::size_t max_triangles) {
+absl::StatusOr<PolygonMesh> read_obj(std::string_view bytes, std::size_t max_triangles, const RunControl& control) {
   TextCursor lines{bytes};
   PolygonMesh mesh;
   for (std::size_t line_number = 1; !lines.at_end(); ++line_number) {
+    if (control.interrupted_at(line_number)) return control.status();
     TextCursor words{lines.next_line()};
     const std::string_view keyword = words.next_word();
     absl::Status status;

@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/io/polygon_mesh.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -14,6 +15,6 @@ namespace binpose {
 /// @param bytes  hostile.
 /// Errors: INVALID_ARGUMENT (a number or an index that cannot be read; names the line), RESOURCE_EXHAUSTED (more faces
 /// than `max_triangles`, or more than three times as many vertices).
-absl::StatusOr<PolygonMesh> read_obj(std::string_view bytes, std::size_t max_triangles);
+absl::StatusOr<PolygonMesh> read_obj(std::string_view bytes, std::size_t max_triangles, const RunControl& control = {});
 
 }  // namespace binpose

@@ -111,7 +111,7 @@ absl::StatusOr<std::string> decompress(std::string_view body, std::size_t expect
 
 /// The data of an "ascii" body: one word per number, for both kinds of vector at once.
 absl::Status read_ascii(std::string_view body, const PcdHeader& header, const VectorFields& xyz,
-                        const std::optional<VectorFields>& normal, PointCloud& cloud) {
+                        const std::optional<VectorFields>& normal, const RunControl& control, PointCloud& cloud) {
   TextCursor cursor{body};
   std::vector<std::string_view> words(header.point_numbers);
   const auto read_vector = [&](const VectorFields& fields, Eigen::Vector3f& vector) {
@@ -123,6 +123,7 @@ absl::Status read_ascii(std::string_view body, const PcdHeader& header, const Ve
     return true;
   };
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (control.interrupted_at(i)) return control.status();
     for (std::string_view& word : words) word = cursor.next_word();
     if (words.back().empty() || !read_vector(xyz, cloud.points[i]) ||
         (normal.has_value() && !read_vector(*normal, cloud.normals[i]))) {
@@ -135,8 +136,8 @@ absl::Status read_ascii(std::string_view body, const PcdHeader& header, const Ve
 }
 
 absl::Status read_body(std::string_view body, const PcdHeader& header, const VectorFields& xyz,
-                       const std::optional<VectorFields>& normal, PointCloud& cloud) {
-  if (header.encoding == PcdEncoding::kAscii) return read_ascii(body, header, xyz, normal, cloud);
+                       const std::optional<VectorFields>& normal, const RunControl& control, PointCloud& cloud) {
+  if (header.encoding == PcdEncoding::kAscii) return read_ascii(body, header, xyz, normal, control, cloud);
   if (header.encoding == PcdEncoding::kBinary) {
     absl::Status status = read_binary(body, header.point_bytes, xyz, cloud.points);
     if (status.ok() && normal.has_value()) status = read_binary(body, header.point_bytes, *normal, cloud.normals);
@@ -151,7 +152,8 @@ absl::Status read_body(std::string_view body, const PcdHeader& header, const Vec
 
 }  // namespace
 
-absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_unit, std::size_t max_points) {
+absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_unit, std::size_t max_points,
+                                    const RunControl& control) {
   const absl::StatusOr<PcdHeader> header = parse_pcd_header(bytes, max_points);
   if (!header.ok()) return header.status();
   const auto xyz = find_vector(*header, {"x", "y", "z"});
@@ -163,7 +165,8 @@ absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_un
   PointCloud cloud;
   cloud.points.resize(header->point_count());
   if (normal->has_value()) cloud.normals.resize(header->point_count());
-  if (absl::Status status = read_body(body, *header, **xyz, *normal, cloud); !status.ok()) return status;
+  if (absl::Status status = read_body(body, *header, **xyz, *normal, control, cloud); !status.ok()) return status;
+  if (absl::Status status = control.status(); !status.ok()) return status;
   for (Eigen::Vector3f& point : cloud.points) point *= static_cast<float>(metres_per_unit);
   normalize_or_drop_normals(cloud);
   cloud.width = static_cast<std::uint32_t>(header->width);

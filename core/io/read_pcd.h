@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/geometry/point_cloud.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -16,7 +17,8 @@ namespace binpose {
 /// @param bytes            the file; hostile. NaN in x, y or z: no measurement.
 /// @param metres_per_unit  1 or 0.001.
 /// Errors, each naming the value and the limit: INVALID_ARGUMENT (truncated, self-contradicting, fields missing),
-/// RESOURCE_EXHAUSTED (more than `max_points`, or more than 256 MiB when decompressed).
-absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_unit, std::size_t max_points);
+/// RESOURCE_EXHAUSTED (more than `max_points`, or more than 256 MiB when decompressed); or what `control` says.
+absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_unit, std::size_t max_points,
+                                    const RunControl& control = {});
 
 }  // namespace binpose

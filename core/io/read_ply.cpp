@@ -33,7 +33,8 @@ struct Vertices {
   std::vector<Eigen::Vector3f> normals;  ///< empty when the file has none
 };
 
-absl::StatusOr<Vertices> read_vertices(const PlyElement& element, std::size_t max_vertices, PlyBody& body) {
+absl::StatusOr<Vertices> read_vertices(const PlyElement& element, std::size_t max_vertices, PlyBody& body,
+                                       const RunControl& control) {
   if (element.row_count > max_vertices) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("The PLY file has %d vertices; the limit is %d.", element.row_count, max_vertices));
@@ -47,6 +48,7 @@ absl::StatusOr<Vertices> read_vertices(const PlyElement& element, std::size_t ma
   vertices.positions.reserve(element.row_count);
   PlyRow row;
   for (std::size_t i = 0; i < element.row_count; ++i) {
+    if (control.interrupted_at(i)) return control.status();
     if (absl::Status status = body.read_row(element, std::nullopt, row); !status.ok()) return status;
     vertices.positions.push_back(vector_of(row, *xyz));
     if (normal.has_value()) vertices.normals.push_back(vector_of(row, *normal));
@@ -69,7 +71,8 @@ absl::Status append_face(const std::vector<double>& indices, PolygonMesh& mesh) 
   return absl::OkStatus();
 }
 
-absl::Status read_faces(const PlyElement& element, std::size_t max_triangles, PlyBody& body, PolygonMesh& mesh) {
+absl::Status read_faces(const PlyElement& element, std::size_t max_triangles, PlyBody& body, const RunControl& control,
+                        PolygonMesh& mesh) {
   if (element.row_count > max_triangles) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("The PLY file has %d faces; the limit is %d.", element.row_count, max_triangles));
@@ -79,6 +82,7 @@ absl::Status read_faces(const PlyElement& element, std::size_t max_triangles, Pl
   if (!list.has_value()) return absl::InvalidArgumentError("The faces of the PLY file lack the list vertex_indices.");
   PlyRow row;
   for (std::size_t i = 0; i < element.row_count; ++i) {
+    if (control.interrupted_at(i)) return control.status();
     if (absl::Status status = body.read_row(element, list, row); !status.ok()) return status;
     if (absl::Status status = append_face(row.list, mesh); !status.ok()) return status;
   }
@@ -87,7 +91,8 @@ absl::Status read_faces(const PlyElement& element, std::size_t max_triangles, Pl
 
 }  // namespace
 
-absl::StatusOr<PolygonMesh> read_ply_mesh(std::string_view bytes, std::size_t max_triangles) {
+absl::StatusOr<PolygonMesh> read_ply_mesh(std::string_view bytes, std::size_t max_triangles,
+                                          const RunControl& control) {
   const absl::StatusOr<PlyHeader> header = parse_ply_header(bytes);
   if (!header.ok()) return header.status();
   PlyBody body(bytes, *header);
@@ -95,29 +100,30 @@ absl::StatusOr<PolygonMesh> read_ply_mesh(std::string_view bytes, std::size_t ma
   for (const PlyElement& element : header->elements) {
     absl::Status status;
     if (element.name == "vertex") {
-      absl::StatusOr<Vertices> vertices = read_vertices(element, 3 * max_triangles, body);
+      absl::StatusOr<Vertices> vertices = read_vertices(element, 3 * max_triangles, body, control);
       if (vertices.ok()) mesh.vertices = std::move(vertices->positions);
       status = vertices.status();
     } else if (element.name == "face") {
-      status = read_faces(element, max_triangles, body, mesh);
+      status = read_faces(element, max_triangles, body, control, mesh);
     } else {
-      status = body.skip_rows(element);
+      status = body.skip_rows(element, control);
     }
     if (!status.ok()) return status;
   }
   return mesh;
 }
 
-absl::StatusOr<PointCloud> read_ply_cloud(std::string_view bytes, double metres_per_unit, std::size_t max_points) {
+absl::StatusOr<PointCloud> read_ply_cloud(std::string_view bytes, double metres_per_unit, std::size_t max_points,
+                                          const RunControl& control) {
   const absl::StatusOr<PlyHeader> header = parse_ply_header(bytes);
   if (!header.ok()) return header.status();
   PlyBody body(bytes, *header);
   for (const PlyElement& element : header->elements) {
     if (element.name != "vertex") {
-      if (absl::Status status = body.skip_rows(element); !status.ok()) return status;
+      if (absl::Status status = body.skip_rows(element, control); !status.ok()) return status;
       continue;
     }
-    absl::StatusOr<Vertices> vertices = read_vertices(element, max_points, body);
+    absl::StatusOr<Vertices> vertices = read_vertices(element, max_points, body, control);
     if (!vertices.ok()) return vertices.status();
     PointCloud cloud;
     cloud.points = std::move(vertices->positions);

@@ -44,7 +44,8 @@ void append_triangle(const Corners& corners, PolygonMesh& mesh) {
   }
 }
 
-absl::StatusOr<PolygonMesh> read_binary_stl(std::string_view bytes, std::size_t max_triangles) {
+absl::StatusOr<PolygonMesh> read_binary_stl(std::string_view bytes, std::size_t max_triangles,
+                                            const RunControl& control) {
   if (bytes.size() < kHeaderBytes) {
     return absl::InvalidArgumentError(
         absl::StrFormat("The binary STL file has %d bytes; its header alone takes %d.", bytes.size(), kHeaderBytes));
@@ -64,6 +65,7 @@ absl::StatusOr<PolygonMesh> read_binary_stl(std::string_view bytes, std::size_t 
   mesh.corners.reserve(3 * count);
   mesh.vertices.reserve(3 * count);
   for (std::size_t i = 0; i < count; ++i) {
+    if (control.interrupted_at(i)) return control.status();
     const char* triangle = bytes.data() + kHeaderBytes + i * kTriangleBytes + kNormalBytes;
     Corners corners;
     for (Eigen::Vector3f& vertex : corners) {
@@ -126,7 +128,8 @@ void read_facet(AsciiStl& stl, PolygonMesh& mesh) {
   append_triangle(corners, mesh);
 }
 
-absl::StatusOr<PolygonMesh> read_ascii_stl(std::string_view bytes, std::size_t max_triangles) {
+absl::StatusOr<PolygonMesh> read_ascii_stl(std::string_view bytes, std::size_t max_triangles,
+                                           const RunControl& control) {
   AsciiStl stl(bytes);
   PolygonMesh mesh;
   bool is_open = false;
@@ -138,6 +141,7 @@ absl::StatusOr<PolygonMesh> read_ascii_stl(std::string_view bytes, std::size_t m
       stl.skip_line();
     } else if (is_open && equal_ignoring_case(word, "facet")) {
       if (mesh.corner_counts.size() == max_triangles) return too_many(max_triangles + 1, max_triangles);
+      if (control.interrupted_at(mesh.corner_counts.size())) return control.status();
       read_facet(stl, mesh);
     } else {
       stl.fail(is_open ? "facet\" or \"endsolid" : "solid", word);
@@ -152,12 +156,12 @@ bool is_binary_stl(std::string_view bytes) {
   return bytes.size() >= kHeaderBytes && stated_size(bytes) == bytes.size();
 }
 
-absl::StatusOr<PolygonMesh> read_stl(std::string_view bytes, std::size_t max_triangles) {
+absl::StatusOr<PolygonMesh> read_stl(std::string_view bytes, std::size_t max_triangles, const RunControl& control) {
   // The triangle count of any binary file of an admissible size has a zero byte; text has none.
   const bool has_zero = bytes.substr(0, kHeaderBytes).find('\0') != std::string_view::npos;
   const bool is_text = equal_ignoring_case(TextCursor{bytes}.next_word(), "solid") && !has_zero;
-  return is_text && !is_binary_stl(bytes) ? read_ascii_stl(bytes, max_triangles)
-                                          : read_binary_stl(bytes, max_triangles);
+  return is_text && !is_binary_stl(bytes) ? read_ascii_stl(bytes, max_triangles, control)
+                                          : read_binary_stl(bytes, max_triangles, control);
 }
 
 }  // namespace binpose

@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/io/polygon_mesh.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -16,7 +17,7 @@ bool is_binary_stl(std::string_view bytes);
 ///
 /// @param bytes  hostile.
 /// Errors: INVALID_ARGUMENT (truncated, of a length that contradicts its triangle count, a word out of place),
-/// RESOURCE_EXHAUSTED (more than `max_triangles`).
-absl::StatusOr<PolygonMesh> read_stl(std::string_view bytes, std::size_t max_triangles);
+/// RESOURCE_EXHAUSTED (more than `max_triangles`); or what `control` says.
+absl::StatusOr<PolygonMesh> read_stl(std::string_view bytes, std::size_t max_triangles, const RunControl& control = {});
 
 }  // namespace binpose

@@ -1,12 +1,12 @@
 #include "core/train/contour_pairs.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
-
-#include "core/train/select.h"
 
 namespace binpose {
 namespace {
@@ -46,10 +46,11 @@ std::tuple<int, int, int> histogram_bin(const ContourFeature& f, double diameter
 
 }  // namespace
 
-std::vector<PooledContour> pool_contours(std::span<const std::vector<ContourPoint>> views, double cell) {
+std::vector<PooledContour> pool_contours(std::span<const std::vector<ContourPoint>> views, double cell,
+                                         const RunControl& control) {
   std::map<Cell, Sum> sums;
   const std::size_t words = (views.size() + 63) / 64;
-  for (std::size_t k = 0; k < views.size(); ++k) {
+  for (std::size_t k = 0; k < views.size() && !control.interrupted(); ++k) {
     for (ContourPoint c : views[k]) {
       const Eigen::Vector3f in_plane = c.outward - c.normal * c.normal.dot(c.outward);
       if (in_plane.norm() < 0.5F) continue;  // the side of a rounded surface
@@ -95,7 +96,7 @@ RatedContourPairs select_contour_pairs(std::span<const PooledContour> contours, 
     }
   }
   std::vector<double> values(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
+  for (std::size_t i = 0; i < pairs.size() && !control.interrupted_at(i); ++i) {
     int seen = 0;
     for (std::size_t w = 0; w < contours[pairs[i].a].views.size(); ++w) {
       seen += std::popcount(contours[pairs[i].a].views[w] & contours[pairs[i].b].views[w]);
@@ -104,8 +105,18 @@ RatedContourPairs select_contour_pairs(std::span<const PooledContour> contours, 
   }
   RatedContourPairs rated;
   std::vector<int> used(contours.size(), 0);
-  for (const std::size_t i : best_pairs(values, values.size())) {
-    if (rated.pairs.size() >= count || values[i] <= 0) break;
+  // A heap gives the best one after the other, as most are never asked for; of equal ones the first.
+  std::vector<std::size_t> heap(values.size());
+  std::iota(heap.begin(), heap.end(), 0);
+  const auto worse = [&](std::size_t a, std::size_t b) {
+    return values[a] != values[b] ? values[a] < values[b] : a > b;
+  };
+  std::make_heap(heap.begin(), heap.end(), worse);
+  while (!heap.empty() && rated.pairs.size() < count && !control.interrupted()) {
+    std::pop_heap(heap.begin(), heap.end(), worse);
+    const std::size_t i = heap.back();
+    heap.pop_back();
+    if (values[i] <= 0) break;
     if (std::max(used[pairs[i].a], used[pairs[i].b]) >= kMostPairsPerPoint) continue;
     ++used[pairs[i].a];
     ++used[pairs[i].b];

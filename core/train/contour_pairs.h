@@ -21,7 +21,9 @@ struct PooledContour {
 ///
 /// @param cell  points nearer than this, with normal and outward direction within about 25 degrees, are one piece;
 /// metres.
-std::vector<PooledContour> pool_contours(std::span<const std::vector<ContourPoint>> views, double cell);
+/// Ends early when `control` interrupts.
+std::vector<PooledContour> pool_contours(std::span<const std::vector<ContourPoint>> views, double cell,
+                                         const RunControl& control = {});
 
 /// The `count` contour pairs with the most expected true votes over the noise of false ones, Obs / sqrt(Ph), best
 /// first, with the weight of a vote of each.

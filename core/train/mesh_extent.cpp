@@ -15,13 +15,16 @@ constexpr double kSmallestDiameter = 1e-6;
 constexpr double kLargestDiameter = 1e4;
 /// Area over the square of the diameter, below which there is nothing to sample: a wire 3000 times as long as thick.
 constexpr double kLeastRelativeArea = 1e-3;
+/// Area over the square of the diameter, above which there is more surface than fits into memory as points; a sphere
+/// has 3.1.
+constexpr double kMostRelativeArea = 200;
 /// Directions in which the outermost vertices are compared; about 6 degrees apart, which misses at most
 /// 1 - cos(3 degrees) = 0.14 % of the diameter.
 constexpr int kExtremeDirections = 1000;
 
 }  // namespace
 
-absl::Status check_mesh(const Mesh& mesh) {
+absl::Status check_mesh(const Mesh& mesh, const RunControl& control) {
   if (mesh.triangles.empty()) {
     return absl::InvalidArgumentError("mesh holds 0 triangles; it must hold at least 1.");
   }
@@ -37,7 +40,8 @@ absl::Status check_mesh(const Mesh& mesh) {
       }
     }
   }
-  const MeshExtent extent = mesh_extent(mesh);
+  const MeshExtent extent = mesh_extent(mesh, control);
+  if (absl::Status status = control.status(); !status.ok()) return status;
   if (!(extent.diameter >= kSmallestDiameter && extent.diameter <= kLargestDiameter)) {
     return absl::InvalidArgumentError(
         absl::StrFormat("mesh has a diameter of %g m; it must lie in [%g, %g] m. Check the unit.", extent.diameter,
@@ -50,10 +54,17 @@ absl::Status check_mesh(const Mesh& mesh) {
         "are degenerate, or a stray one lies far off.",
         extent.area, extent.diameter, least_area));
   }
+  const double most_area = kMostRelativeArea * extent.diameter * extent.diameter;
+  if (!(extent.area <= most_area)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "mesh has a surface area of %g square metres; for its diameter of %g m it must be at most %g. Remove inner "
+        "structure and doubled faces from the CAD export.",
+        extent.area, extent.diameter, most_area));
+  }
   return absl::OkStatus();
 }
 
-MeshExtent mesh_extent(const Mesh& mesh) {
+MeshExtent mesh_extent(const Mesh& mesh, const RunControl& control) {
   MeshExtent extent;
   std::vector<bool> used(mesh.vertices.size(), false);
   for (const auto& t : mesh.triangles) {
@@ -77,6 +88,7 @@ MeshExtent mesh_extent(const Mesh& mesh) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3f offset = mesh.vertices[i] - centre;
     if (!used[i] || offset.norm() < inner) continue;
+    if (control.interrupted()) return extent;
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const float along = directions[d].dot(offset);
       if (along > farthest[d]) {
@@ -85,7 +97,7 @@ MeshExtent mesh_extent(const Mesh& mesh) {
       }
     }
   }
-  for (std::size_t a = 0; a < extreme.size(); ++a) {
+  for (std::size_t a = 0; a < extreme.size() && !control.interrupted(); ++a) {
     for (std::size_t b = a + 1; b < extreme.size(); ++b) {
       extent.diameter = std::max(extent.diameter,
                                  static_cast<double>((mesh.vertices[extreme[a]] - mesh.vertices[extreme[b]]).norm()));

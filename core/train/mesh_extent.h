@@ -4,6 +4,7 @@
 
 #include "absl/status/status.h"
 #include "core/geometry/mesh.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -15,10 +16,11 @@ struct MeshExtent {
 };
 
 /// OK, or INVALID_ARGUMENT saying why nothing can be trained from this mesh: no triangles, an index out of range, a
-/// coordinate that is not finite, next to no area, or an extent outside [1 um, 10 km].
-absl::Status check_mesh(const Mesh& mesh);
+/// coordinate that is not finite, next to no area or far too much, or an extent outside [1 um, 10 km]; or what
+/// `control` says.
+absl::Status check_mesh(const Mesh& mesh, const RunControl& control = {});
 
-/// Extent of a mesh that check_mesh() accepts.
-MeshExtent mesh_extent(const Mesh& mesh);
+/// Extent of a mesh that check_mesh() accepts; of part of it when `control` interrupts.
+MeshExtent mesh_extent(const Mesh& mesh, const RunControl& control = {});
 
 }  // namespace binpose

@@ -45,8 +45,8 @@ std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> de
       view.normals.push_back(cosine > kGrazingCosine ? Eigen::Vector3f(T_view_model.linear() * point.normal)
                                                      : Eigen::Vector3f::Zero());
     }
-    DepthMap map = depth_map(view, pixel);
-    find_contours(map, static_cast<float>(step), Unmeasured::kFar, 1);
+    DepthMap map = depth_map(view, pixel, control);
+    find_contours(map, static_cast<float>(step), Unmeasured::kFar);
     views[k] = std::move(map.contours);
     const Eigen::Isometry3f T_model_view = T_view_model.inverse();
     for (ContourPoint& contour : views[k]) {

@@ -26,7 +26,7 @@ std::vector<std::uint32_t> scrambled_order(std::uint32_t count) {
 
 }  // namespace
 
-std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing) {
+std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control) {
   std::vector<SurfacePoint> points;
   double owed = 0.5;  // area not yet turned into points, in units of one point
   std::uint64_t serial = 0;
@@ -40,6 +40,7 @@ std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing) {
     owed += 0.5 * double_area / (spacing * spacing);
     const Eigen::Vector3f normal = (cross.cast<double>() / double_area).cast<float>();
     for (; owed >= 1; owed -= 1, ++serial) {
+      if (control.interrupted_at(serial)) return points;
       // The R2 sequence covers the unit square evenly; folding the square gives the triangle.
       double s = std::fmod(0.5 + serial * 0.7548776662466927, 1.0);
       double t = std::fmod(0.5 + serial * 0.5698402909980532, 1.0);
@@ -53,7 +54,8 @@ std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing) {
   return points;
 }
 
-std::vector<SurfacePoint> thin_evenly(const std::vector<SurfacePoint>& dense, double distance) {
+std::vector<SurfacePoint> thin_evenly(const std::vector<SurfacePoint>& dense, double distance,
+                                      const RunControl& control) {
   const std::vector<std::uint32_t> order = scrambled_order(static_cast<std::uint32_t>(dense.size()));
   std::vector<std::uint32_t> kept;
   std::vector<bool> taken(dense.size(), false);
@@ -61,6 +63,7 @@ std::vector<SurfacePoint> thin_evenly(const std::vector<SurfacePoint>& dense, do
     CellIndex index(dense, static_cast<float>(coarse));
     for (const std::uint32_t i : kept) index.insert(i);
     for (const std::uint32_t i : order) {
+      if (control.interrupted()) break;
       if (taken[i] || index.near(dense[i], static_cast<float>(coarse))) continue;
       taken[i] = true;
       kept.push_back(i);

@@ -3,17 +3,20 @@
 #include <vector>
 
 #include "core/geometry/mesh.h"
+#include "core/run_control.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
 
 /// Points spread over the surface in proportion to area, about one per `spacing` squared, each with the outward normal
-/// of its triangle. Triangles without area get none.
-std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing);
+/// of its triangle. Triangles without area get none. Part of them when `control` interrupts.
+std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control = {});
 
 /// Thins points to an even spread: no two on the same side of the surface are nearer than `distance`, and no point of
 /// `dense` is farther from a kept one. Progressive: every prefix of the result is evenly spread too, ever finer.
-/// Two sides of a thin sheet (normals more than 60 degrees apart) are thinned each for itself.
-std::vector<SurfacePoint> thin_evenly(const std::vector<SurfacePoint>& dense, double distance);
+/// Two sides of a thin sheet (normals more than 60 degrees apart) are thinned each for itself. Part of them when
+/// `control` interrupts.
+std::vector<SurfacePoint> thin_evenly(const std::vector<SurfacePoint>& dense, double distance,
+                                      const RunControl& control = {});
 
 }  // namespace binpose

@@ -119,7 +119,7 @@ std::vector<RatedTurn> coarse_turns(const Nearness& nearness, const std::vector<
                    [](const RatedTurn& a, const RatedTurn& b) { return a.share > b.share; });
   std::vector<RatedTurn> kept;
   for (const RatedTurn& turn : turns) {
-    if (kept.size() >= kMostRefined) break;
+    if (kept.size() >= kMostRefined || control.interrupted()) break;
     // 12 degrees: less than the grid's step would keep the flanks of each peak.
     const bool repeats = std::any_of(kept.begin(), kept.end(), [&](const RatedTurn& other) {
       return same_turn(other.T, turn.T, radius, 0.2F * radius);
@@ -224,18 +224,18 @@ class TurnSearch {
     complete(found, control);
     std::stable_sort(found.begin() + 1, found.end(),
                      [](const RatedTurn& a, const RatedTurn& b) { return a.share > b.share; });
-    return peaks(found);
+    return peaks(found, control);
   }
 
   /// Whether the part is one of revolution about the axis of a turn.
-  bool revolves_about_axis_of(const Eigen::Isometry3f& T) const {
+  bool revolves_about_axis_of(const Eigen::Isometry3f& T, const RunControl& control) const {
     const auto [direction, point] = axis_of(T, middle_);
     for (int i = 1; i <= kAxisProbes; ++i) {
       const float angle = static_cast<float>(2 * std::numbers::pi * std::fmod(0.6180339887 * i, 1.0));
       Eigen::Isometry3f turn = Eigen::Isometry3f::Identity();
       turn.linear() = Eigen::AngleAxisf(angle, direction).toRotationMatrix();
       turn.translation() = point - turn.linear() * point;
-      if (share(turn, kJudgedPoints) < kSameShare) return false;
+      if (control.interrupted() || share(turn, kJudgedPoints) < kSameShare) return false;
     }
     return true;
   }
@@ -259,11 +259,11 @@ class TurnSearch {
   }
 
   /// Leaves out turns on the flank of a better one: halfway to it the part fits no worse.
-  std::vector<RatedTurn> peaks(const std::vector<RatedTurn>& turns) const {
+  std::vector<RatedTurn> peaks(const std::vector<RatedTurn>& turns, const RunControl& control) const {
     std::vector<RatedTurn> kept;
     for (const RatedTurn& turn : turns) {
       const bool on_flank = std::any_of(kept.begin(), kept.end(), [&](const RatedTurn& better) {
-        return same_turn(better.T, turn.T, radius(), kFlank * radius()) &&
+        return same_turn(better.T, turn.T, radius(), kFlank * radius()) && !control.interrupted() &&
                share(halfway(better.T, turn.T, middle_), kJudgedPoints) >= turn.share - kDip;
       });
       if (!on_flank) kept.push_back(turn);
@@ -296,7 +296,7 @@ SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, cons
   SelfSimilarity result;
   Symmetry& symmetry = result.symmetry;
   for (std::size_t i = 1; i < turns.size() && turns[i].share >= kSameShare && !symmetry.has_axis; ++i) {
-    if (!search.revolves_about_axis_of(turns[i].T)) continue;
+    if (!search.revolves_about_axis_of(turns[i].T, control)) continue;
     const auto [direction, point] = axis_of(turns[i].T, search.middle());
     symmetry.has_axis = true;
     symmetry.axis_direction = direction.cast<double>();
@@ -321,11 +321,12 @@ SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, cons
 }
 
 std::vector<SurfacePoint> telling_points(const std::vector<SurfacePoint>& dense, const std::vector<Pose>& similar,
-                                         double diameter) {
+                                         double diameter, const RunControl& control) {
   CellIndex index(dense, static_cast<float>(kOnSurface * diameter));
   index.insert_all();
   std::vector<SurfacePoint> telling;
   for (const SurfacePoint& point : dense) {
+    if (control.interrupted()) break;
     const bool moves_off = std::any_of(similar.begin(), similar.end(), [&](const Pose& pose) {
       const Eigen::Isometry3f T = pose.cast<float>();
       return !index.near({T * point.position, T.linear() * point.normal}, static_cast<float>(kOnSurface * diameter));

@@ -23,8 +23,9 @@ struct SelfSimilarity {
 SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, const std::vector<SurfacePoint>& surface,
                                     double diameter, const RunControl& control);
 
-/// The points of `dense` that at least one of the turns takes off the surface: what tells a pose from its likes.
+/// The points of `dense` that at least one of the turns takes off the surface: what tells a pose from its likes. Part
+/// of them when `control` interrupts.
 std::vector<SurfacePoint> telling_points(const std::vector<SurfacePoint>& dense, const std::vector<Pose>& similar,
-                                         double diameter);
+                                         double diameter, const RunControl& control = {});
 
 }  // namespace binpose

@@ -30,11 +30,11 @@ constexpr std::size_t kMostTelling = 2000;
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
 /// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
-std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter) {
-  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter);
+std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter, const RunControl& control) {
+  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter, control);
   constexpr int kViewsToTellTheSides = 60;
   const std::vector<bool> behind =
-      seen_from_behind(dense, view_directions(kViewsToTellTheSides), kRelativeCell * diameter);
+      seen_from_behind(dense, view_directions(kViewsToTellTheSides), kRelativeCell * diameter, control);
   for (std::size_t i = 0; i < dense.size(); ++i) {
     if (behind[i]) dense[i].normal = -dense[i].normal;
   }
@@ -51,11 +51,13 @@ std::vector<ContourPoint> evenly_taken(const std::vector<ContourPoint>& all, std
 
 /// Pairs of one scale, selected [Eq. 2-7], appended to the model.
 void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>& masks, std::size_t count,
-                  Model& model) {
+                  const RunControl& control, Model& model) {
   const int views = model.params.viewpoint_count;
-  const std::vector<double> ph = occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width));
+  const std::vector<double> ph =
+      occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width), control);
   std::vector<double> values(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (control.interrupted_at(i)) return;
     const double obs = observability(masks[pairs[i].p], masks[pairs[i].q1], masks[pairs[i].q2], views);
     values[i] = pair_value(obs, ph[i], model.params);
   }
@@ -75,18 +77,20 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
     return control.status();
   };
   if (absl::Status status = validate(params); !status.ok()) return status;
-  if (absl::Status status = check_mesh(mesh); !status.ok()) return status;
+  if (absl::Status status = check_mesh(mesh, control); !status.ok()) return status;
 
   if (absl::Status status = enter(TrainStage::kSampling, 0.0); !status.ok()) return status;
   Model model;
   model.params = params;
-  const MeshExtent extent = mesh_extent(mesh);
+  const MeshExtent extent = mesh_extent(mesh, control);
+  if (absl::Status status = control.status(); !status.ok()) return status;
   model.diameter = extent.diameter;
   model.box_min = extent.box_min;
   model.box_max = extent.box_max;
-  const std::vector<SurfacePoint> dense = outer_surface(mesh, model.diameter);
-  model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter);
-  model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter);
+  const std::vector<SurfacePoint> dense = outer_surface(mesh, model.diameter, control);
+  model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter, control);
+  model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter, control);
+  if (absl::Status status = control.status(); !status.ok()) return status;
   if (model.surface.size() > kMostPoints || model.pair_points.size() > kMostPoints) {
     return absl::InvalidArgumentError(
         "mesh has too much inner or folded surface for its diameter; remove inner structure from the CAD export.");
@@ -100,7 +104,7 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
 
   std::vector<std::vector<ContourPoint>> views = outlines(
       dense, viewpoints, model.diameter, kRelativePixel * model.diameter, kRelativeStep * model.diameter, control);
-  const std::vector<PooledContour> contours = pool_contours(views, kRelativeContourCell * model.diameter);
+  const std::vector<PooledContour> contours = pool_contours(views, kRelativeContourCell * model.diameter, control);
   for (const PooledContour& contour : contours) model.contour_points.push_back(contour.point);
   RatedContourPairs rated =
       select_contour_pairs(contours, model.diameter, kContourPairs, params.viewpoint_count, control);
@@ -115,24 +119,25 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
     if (absl::Status status = enter(TrainStage::kVectorPairs, 0.5 + 0.4 * scale / scales); !status.ok()) return status;
     select_pairs(vector_pairs(model.pair_points, params.pair_lengths[scale], params.relative_length_tolerance,
                               model.diameter, scale, control),
-                 pair_masks, pairs_per_scale, model);
+                 pair_masks, pairs_per_scale, control, model);
   }
 
   if (absl::Status status = enter(TrainStage::kSymmetry, 0.9); !status.ok()) return status;
   SelfSimilarity self = find_self_similarity(dense, model.surface, model.diameter, control);
   model.symmetry = std::move(self.symmetry);
   model.similar_poses = std::move(self.similar);
-  const std::vector<SurfacePoint> telling = telling_points(dense, model.similar_poses, model.diameter);
+  const std::vector<SurfacePoint> telling = telling_points(dense, model.similar_poses, model.diameter, control);
   model.telling_spacing = kRelativeTellingSpacing * model.diameter;
   do {
-    model.telling_points = thin_evenly(telling, model.telling_spacing);
+    model.telling_points = thin_evenly(telling, model.telling_spacing, control);
     model.telling_spacing *= 1.2;
   } while (model.telling_points.size() > kMostTelling);
   model.telling_spacing /= 1.2;
   model.telling_visibility =
       visibility(dense, model.telling_points, viewpoints, kRelativeCell * model.diameter, control);
   if (absl::Status status = control.status(); !status.ok()) return status;
-  derive(model);
+  derive(model, control);
+  if (absl::Status status = control.status(); !status.ok()) return status;
   return model;
 }
 

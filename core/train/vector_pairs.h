@@ -23,8 +23,8 @@ std::vector<VectorPair> vector_pairs(std::span<const SurfacePoint> points, const
                                      double relative_tolerance, double diameter, int scale, const RunControl& control);
 
 /// Ph of each pair [Eq. 2-4]: the share of all pairs that have its feature f(s_p, s_q1, s_q2). 1 - Ph is the
-/// distinctiveness. In the order of `pairs`, each in (0, 1].
+/// distinctiveness. In the order of `pairs`, each in (0, 1]; of no use when `control` interrupts.
 std::vector<double> occurrence_probability(std::span<const SurfacePoint> points, std::span<const VectorPair> pairs,
-                                           const FeatureBins& bins);
+                                           const FeatureBins& bins, const RunControl& control = {});
 
 }  // namespace binpose

@@ -92,9 +92,10 @@ double observability(const ViewMask& p, const ViewMask& q1, const ViewMask& q2, 
 }
 
 std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const Eigen::Vector3f> viewpoints,
-                                   double cell) {
+                                   double cell, const RunControl& control) {
   std::vector<int> votes(dense.size(), 0);
   for (const Eigen::Vector3f& viewpoint : viewpoints) {
+    if (control.interrupted()) break;
     const ProjectionPlane plane(dense, viewpoint, static_cast<float>(cell));
     for (std::size_t i = 0; i < dense.size(); ++i) {
       const float cosine = plane.cosine(dense[i]);

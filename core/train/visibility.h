@@ -33,8 +33,8 @@ double observability(const ViewMask& point, int view_count);
 double observability(const ViewMask& p, const ViewMask& q1, const ViewMask& q2, int view_count);
 
 /// Turns normals that point into the part: per point, whether the outward side is the other one, judged by the side
-/// from which it is seen. Repairs meshes with inconsistent winding.
+/// from which it is seen. Repairs meshes with inconsistent winding. Judged from fewer views when `control` interrupts.
 std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const Eigen::Vector3f> viewpoints,
-                                   double cell);
+                                   double cell, const RunControl& control = {});
 
 }  // namespace binpose

@@ -1,10 +1,12 @@
 #!/bin/sh
-# Fuzzes each target from its corpus; what it finds anew stays in the build folder. Ends with an error on a crash, a hang or a leak.
-# Usage: run.sh [SECONDS for each target, default 60]
+# Fuzzes each target from its corpus; what it finds anew stays in the build folder. Ends with an error on a crash, a hang
+# or a leak. An input that once broke something belongs into the corpus, which every run of the tests reads.
+# Usage: run.sh [SECONDS for each target, default 60; by night 3600]
 set -eu
 cd "$(dirname "$0")/../.."
 seconds="${1:-60}"
 build=build/fuzz
+deploy/install-packages.sh fuzz
 cmake --preset fuzz >/dev/null
 cmake --build "$build" --target fuzz_mesh fuzz_cloud fuzz_model_file fuzz_request
 for target in mesh cloud model_file request; do

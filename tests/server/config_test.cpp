@@ -34,7 +34,7 @@ TEST(Config, ListensOnLoopbackOnlyUnlessToldOtherwise) {
 TEST(Config, TakesEveryOption) {
   const Config config = parse(
       "--listen [::1]:0 --metrics localhost:9 --model-dir /m --threads 3 --queue 5 --max-message-mib 7 "
-      "--drain-timeout 11 --log-level debug");
+      "--drain-timeout 11 --write-timeout 12 --log-level debug");
   EXPECT_EQ(config.listen, "[::1]:0");
   EXPECT_EQ(config.metrics, "localhost:9");
   EXPECT_EQ(config.model_dir, "/m");
@@ -42,6 +42,7 @@ TEST(Config, TakesEveryOption) {
   EXPECT_EQ(config.queue, 5);
   EXPECT_EQ(config.max_message_mib, 7);
   EXPECT_EQ(config.drain_timeout_seconds, 11);
+  EXPECT_EQ(config.write_timeout_seconds, 12);
   EXPECT_EQ(config.log_level, "debug");
 }
 
@@ -102,7 +103,7 @@ TEST(Config, RefusesWhatCannotBe) {
   for (const char* arguments :
        {"--listen 50051", "--listen :50051", "--listen host:", "--listen host:65536", "--listen host:x", "--threads 0",
         "--threads many", "--queue 0", "--max-message-mib 0", "--max-message-mib 2048", "--drain-timeout -1",
-        "--log-level loud", "--unknown", "positional"}) {
+        "--write-timeout 0", "--log-level loud", "--unknown", "positional"}) {
     EXPECT_THROW(parse(arguments), CLI::ParseError) << arguments;
   }
 }

@@ -40,9 +40,8 @@ class StreamServer final : public v1::DetectionService::WithRawCallbackMethod_De
   Drain& drain() { return drain_; }
   ComputePool& pool() { return pool_; }
 
-  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Detect(
-      grpc::CallbackServerContext* /*context*/) override {
-    return new DetectStream({*this, pool_, memory_, drain_, streams_}, std::nullopt, "");
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Detect(grpc::CallbackServerContext* context) override {
+    return new DetectStream({*this, pool_, memory_, drain_, writes_, streams_}, *context, std::nullopt, "");
   }
 
  private:
@@ -64,6 +63,7 @@ class StreamServer final : public v1::DetectionService::WithRawCallbackMethod_De
   Answer answer_;
   MemoryBudget memory_{std::size_t{1} << 30};
   Drain drain_;
+  WriteWatch writes_{std::chrono::milliseconds(500)};
   prometheus::Gauge streams_;
   ComputePool pool_;
   std::unique_ptr<grpc::Server> server_;
@@ -163,6 +163,20 @@ TEST(DetectStream, CancellingStopsTheComputation) {
   EXPECT_TRUE(stopped.wait_for(1));
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(server.drain().wait_for_calls(std::chrono::seconds(60)));  // the stream is gone
+}
+
+TEST(DetectStream, ACallerThatTakesNoAnswersIsCutOff) {
+  StreamServer server(1, 10, [](const std::string&, const RunControl&) {});
+  grpc::ClientContext context;
+  const auto stream = server.stub().Detect(&context);
+  const std::string long_id(256, 'x');  // the answers fill what the connection takes on its own
+  while (stream->Write(request(long_id))) {
+  }
+  v1::DetectResponse answer;
+  while (stream->Read(&answer)) {
+  }
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(server.drain().wait_for_calls(std::chrono::seconds(60)));
 }
 
 TEST(DetectStream, AFrameThatFindsTheServerFullIsToldSoWithItsId) {

@@ -71,6 +71,18 @@ TEST_F(DetectionServiceTest, SearchesForSeveralModelsInOneRequest) {
   EXPECT_GE(answers[0].hypotheses_size(), 1);
 }
 
+TEST_F(DetectionServiceTest, ATimeBudgetThatIsOverEndsTheSearchAndTheAnswerSaysSo) {
+  v1::DetectRequest hasty = detect_request("hasty", "block"), patient = detect_request("patient", "block");
+  hasty.set_time_budget_seconds(0.001);  // the scan alone takes longer to read
+  patient.set_time_budget_seconds(3600);
+  const auto answers = server().detect({hasty, patient});
+  ASSERT_EQ(answers.size(), 2);
+  EXPECT_FALSE(answers[0].has_error()) << answers[0].error().message();
+  EXPECT_EQ(answers[0].stats().stop_reason(), v1::STOP_REASON_DEADLINE);
+  EXPECT_EQ(answers[1].stats().stop_reason(), v1::STOP_REASON_COMPLETE);
+  EXPECT_GE(answers[1].hypotheses_size(), 1);
+}
+
 TEST_F(DetectionServiceTest, AnswersManyFramesInOrderWithTheirIds) {
   std::vector<v1::DetectRequest> requests(12, detect_request("", "block"));
   for (std::size_t i = 0; i < requests.size(); ++i) requests[i].set_request_id(absl::StrCat("frame ", i));
@@ -262,6 +274,14 @@ INSTANTIATE_TEST_SUITE_P(
                  [](v1::DetectRequest& r) { r.mutable_cloud()->mutable_sensor_position()->set_x(kNaN); },
                  kInvalid,
                  {"cloud.sensor_position", "1000 m"}},
+        BadFrame{"NoTime",
+                 [](v1::DetectRequest& r) { r.set_time_budget_seconds(0); },
+                 kInvalid,
+                 {"time_budget_seconds is 0", "3600]"}},
+        BadFrame{"EndlessTime",
+                 [](v1::DetectRequest& r) { r.set_time_budget_seconds(HUGE_VAL); },
+                 kInvalid,
+                 {"time_budget_seconds is inf"}},
         BadFrame{"MinScore",
                  [](v1::DetectRequest& r) { r.mutable_params()->set_min_score(2); },
                  kInvalid,

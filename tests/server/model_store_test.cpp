@@ -140,6 +140,20 @@ TEST_F(ModelStoreTest, SkipsAndCountsWhatIsNoModelAndDeletesNothing) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path()), {}), 12);
 }
 
+TEST_F(ModelStoreTest, RemovesWhatACrashLeftBehindButNoFileThatMayStillBeWritten) {
+  const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
+  for (const char* name : {".block.model.a1B2c3", ".block.model.Zz9Zz9", ".notes.txt.a1B2c3", ".model"}) {
+    write(path() / name, "half");
+    std::filesystem::last_write_time(path() / name, old);
+  }
+  std::filesystem::last_write_time(path() / ".block.model.Zz9Zz9", std::filesystem::file_time_type::clock::now());
+  open_store(path());
+  EXPECT_FALSE(std::filesystem::exists(path() / ".block.model.a1B2c3"));
+  for (const char* name : {".block.model.Zz9Zz9", ".notes.txt.a1B2c3", ".model"}) {
+    EXPECT_TRUE(std::filesystem::exists(path() / name)) << name;
+  }
+}
+
 TEST_F(ModelStoreTest, ABitFlippedAnywhereHidesThatModelAlone) {
   ASSERT_TRUE(open_store(path())->put("good", block()).ok());
   const std::string good = read(path() / "good.model");

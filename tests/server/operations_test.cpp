@@ -151,7 +151,22 @@ TEST_F(MetricsTest, CountRequestsByMethodAndCodeAndTimeTheStages) {
                 "binpose_request_duration_seconds_bucket{method=\"Detect\",le=\"+Inf\"} 3\n",
                 "binpose_detect_stage_duration_seconds_count{stage=\"refine\"} 2\n",
                 "binpose_detect_queue_duration_seconds_count 2\n", "binpose_models_loaded 1\n",
-                "binpose_model_files_skipped_total 0\n"});
+                "binpose_model_files_skipped_total 0\n", "binpose_train_duration_seconds_count 1\n",
+                "binpose_model_searches_total{model=\"block\"} 2\n"});
+}
+
+TEST_F(MetricsTest, DropTheSeriesOfAModelWithTheModel) {
+  RunningServer& server = start();
+  ASSERT_TRUE(server.train(train_request("block")).ok());
+  server.detect({detect_request("1", "block")});
+  expect_lines(
+      {"binpose_model_searches_total{model=\"block\"} 1\n", "binpose_model_hypotheses_total{model=\"block\"} "});
+  grpc::ClientContext context;
+  v1::DeleteModelRequest request;
+  request.set_id("block");
+  v1::DeleteModelResponse response;
+  ASSERT_TRUE(server.models().DeleteModel(&context, request, &response).ok());
+  EXPECT_THAT(http_get(address(), "/metrics"), Not(HasSubstr("block")));
 }
 
 TEST_F(MetricsTest, CountTheModelFilesThatWereSkipped) {

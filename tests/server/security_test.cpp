@@ -57,13 +57,27 @@ class SecurityTest : public ::testing::Test {
   TemporaryDirectory directory_;
 };
 
-TEST_F(SecurityTest, TlsIsServedAndANewCertificateIsTakenUpWithoutARestart) {
+TEST_F(SecurityTest, ANewCertificateIsTakenUpWhileStreamsOfTheOldOneGoOn) {
   make_certificate("server");
   auto server = Server::start(tls_config());
   ASSERT_TRUE(server.ok()) << server.status();
   const std::string old_ca = read(path() / "server.pem");
   const grpc::Status status = list((*server)->address(), {old_ca, "", ""});
   EXPECT_TRUE(status.ok()) << status.error_message();
+
+  // A stream that was opened with the old certificate ...
+  const auto stub = v1::DetectionService::NewStub(
+      grpc::CreateChannel("localhost" + (*server)->address().substr((*server)->address().rfind(':')),
+                          grpc::SslCredentials({old_ca, "", ""})));
+  grpc::ClientContext context;
+  const auto stream = stub->Detect(&context);
+  const auto is_answered = [&stream](const std::string& id) {
+    v1::DetectRequest request;
+    request.set_request_id(id);
+    v1::DetectResponse answer;
+    return stream->Write(request) && stream->Read(&answer) && answer.request_id() == id;
+  };
+  EXPECT_TRUE(is_answered("before"));
 
   make_certificate("next");
   std::filesystem::rename(path() / "next.key", path() / "server.key");
@@ -74,6 +88,9 @@ TEST_F(SecurityTest, TlsIsServedAndANewCertificateIsTakenUpWithoutARestart) {
     taken_up = list((*server)->address(), {read(path() / "server.pem"), "", ""}).ok();
   }
   EXPECT_TRUE(taken_up);
+  EXPECT_TRUE(is_answered("after"));  // ... lives on
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
 }
 
 TEST_F(SecurityTest, MutualTlsLetsInOnlyWhoShowsACertificate) {
@@ -128,15 +145,19 @@ TEST_F(SecurityTest, EveryCallNeedsATokenOfItsRole) {
   v1::DeleteModelResponse deleted;
   v1::GetModelRequest get_request;
   get_request.set_id("block");
+  v1::GetModelShapeRequest shape_request;
+  shape_request.set_id("block");
+  v1::GetModelShapeResponse shape;
   v1::DeleteModelRequest delete_request;
   delete_request.set_id("block");
   for (const auto& [token, reading, changing] :
        {std::tuple("", grpc::StatusCode::UNAUTHENTICATED, grpc::StatusCode::UNAUTHENTICATED),
         std::tuple("aaaaaaaaaaaaaaaa", grpc::StatusCode::OK, grpc::StatusCode::PERMISSION_DENIED),
         std::tuple("bbbbbbbbbbbbbbbb", grpc::StatusCode::OK, grpc::StatusCode::OK)}) {
-    std::array<grpc::ClientContext, 3> contexts;
+    std::array<grpc::ClientContext, 4> contexts;
     EXPECT_EQ(server.models().GetModel(with(contexts[0], token), get_request, &model).error_code(), reading);
     EXPECT_EQ(server.models().ListModels(with(contexts[1], token), {}, &list).error_code(), reading);
+    EXPECT_EQ(server.models().GetModelShape(with(contexts[3], token), shape_request, &shape).error_code(), reading);
     EXPECT_EQ(server.models().DeleteModel(with(contexts[2], token), delete_request, &deleted).error_code(), changing);
   }
 }

@@ -17,8 +17,8 @@ Model quick_model(const Mesh& mesh) {
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
   const SensorView view = sensor_view(render(bodies, sensor)).value();
   DepthMap map = depth_map(view, std::max(0.014 * diameter, 1.2 * view.spacing));
-  estimate_normals(map, 1, 1);
-  find_contours(map, static_cast<float>(0.03 * diameter), Unmeasured::kUnknown, 1);
+  estimate_normals(map, 1);
+  find_contours(map, static_cast<float>(0.03 * diameter), Unmeasured::kUnknown);
   return map;
 }
 

@@ -73,20 +73,22 @@ class Client:
         with _errors():
             self._models.DeleteModel(model_service_pb2.DeleteModelRequest(id=model_id), timeout=self._timeout)
 
-    def detect(self, models, scan, *, params=None, timeout=60):
-        """Finds parts in one scan. models -- an ID, or several; params -- binpose.v1.DetectParams."""
-        [result] = self.detect_all(models, [scan], params=params, timeout=timeout)
+    def detect(self, models, scan, *, params=None, time_budget=None, timeout=60):
+        """Finds parts in one scan. models -- an ID, or several; params -- binpose.v1.DetectParams; time_budget -- seconds
+        after which the server answers the best that it has found so far."""
+        [result] = self.detect_all(models, [scan], params=params, time_budget=time_budget, timeout=timeout)
         if isinstance(result, BinposeError):
             raise result
         return result
 
-    def detect_all(self, models, scans, *, params=None, timeout=None):
+    def detect_all(self, models, scans, *, params=None, time_budget=None, timeout=None):
         """Yields the Result of each scan, in order, over one stream; a BinposeError in place of one that failed.
 
         scans -- from points(), depth_image() or scan_file(); any iterable, taken as the server gets on.
         """
         ids = [models] if isinstance(models, str) else list(models)
-        requests = (detection_service_pb2.DetectRequest(model_ids=ids, cloud=scan, params=params) for scan in scans)
+        requests = (detection_service_pb2.DetectRequest(model_ids=ids, cloud=scan, params=params,
+                                                        time_budget_seconds=time_budget) for scan in scans)
         with _errors():
             for answer in self._detection.Detect(requests, timeout=timeout):
                 if answer.HasField("error"):

@@ -29,8 +29,8 @@ DepthMap block(std::optional<double> floor_depth, Unmeasured unmeasured, int thr
   sensor.focal = 1.25 * 0.45 / kPixel;  // more than a point per pixel
   sensor.floor_depth = floor_depth;
   DepthMap map = depth_map(*sensor_view(testing::render(bodies, sensor)), kPixel);
-  estimate_normals(map, 1, threads);
-  find_contours(map, kStep, unmeasured, threads);
+  estimate_normals(map, 1, {.threads = threads});
+  find_contours(map, kStep, unmeasured, {.threads = threads});
   return map;
 }
 

@@ -26,7 +26,7 @@ DepthMap map_of(std::span<const testing::PlacedMesh> bodies, std::optional<doubl
   sensor.floor_depth = floor_depth;
   sensor.noise = noise;
   DepthMap map = depth_map(*sensor_view(testing::render(bodies, sensor)), kPixel);
-  estimate_normals(map, 1, 1);
+  estimate_normals(map, 1);
   return map;
 }
 
@@ -138,7 +138,7 @@ TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   lonely.width = 3;
   lonely.height = 1;
   DepthMap sparse = depth_map(*sensor_view(lonely), kPixel);
-  estimate_normals(sparse, 1, 1);
+  estimate_normals(sparse, 1);
   for (const Vector3f& normal : sparse.normals) EXPECT_TRUE(normal.isZero());
 }
 
@@ -164,7 +164,7 @@ TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
   for (const int threads : {2, 4}) {
     DepthMap many = one;
-    estimate_normals(many, 1, threads);
+    estimate_normals(many, 1, {.threads = threads});
     EXPECT_EQ(many.normals, one.normals);
   }
 }

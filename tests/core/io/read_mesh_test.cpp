@@ -311,6 +311,31 @@ TEST(ReadMesh, KeepsTrianglesWithoutArea) {
   EXPECT_EQ(mesh->triangles.size(), 2u);
 }
 
+/// A text file of many equal rows and damaged at its end, which a reader that has been stopped does not reach.
+struct LongFile {
+  std::string before;
+  std::string row;
+};
+
+TEST(ReadMesh, EndsSoonAfterItsCallerHasGone) {
+  const LongFile files[] = {
+      {"", "v 1 2 3\n"},
+      {"solid\n", "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n"},
+      {ply_header("ascii", 3000, 1), "1 2 3\n"}};
+  std::stop_source stop;
+  stop.request_stop();
+  for (const LongFile& file : files) {
+    std::string bytes = file.before;
+    for (int i = 0; i < 2000; ++i) bytes += file.row;
+    bytes += "v damaged";
+    const auto code = [&](const RunControl& control) {
+      return read_mesh(bytes, MeshFormat::kDetect, 1, {}, control).status().code();
+    };
+    EXPECT_EQ(code({}), absl::StatusCode::kInvalidArgument) << file.row;
+    EXPECT_EQ(code({.stop = stop.get_token()}), absl::StatusCode::kCancelled) << file.row;
+  }
+}
+
 TEST(ReadMesh, TakesWindowsLineEnds) {
   EXPECT_TRUE(read("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n").ok());
   EXPECT_TRUE(read("ply\r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty float x\r\nproperty float y\r\n"

@@ -56,6 +56,10 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
   for (Eigen::Vector3f& v : huge.vertices) v *= 1e6F;
   for (Eigen::Vector3f& v : tiny.vertices) v *= 1e-6F;
   for (Eigen::Vector3f& v : overflowing.vertices) v *= 1e30F;
+  Mesh folded = good;
+  for (int i = 0; i < 200; ++i) {
+    folded.triangles.insert(folded.triangles.end(), good.triangles.begin(), good.triangles.end());
+  }
   const Refused cases[] = {{empty, "0 triangles"},
                            {bad_index, "triangle 3 refers to vertex 99; there are 8"},
                            {not_finite, "vertex 2 has a coordinate that is not a finite number"},
@@ -63,7 +67,8 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
                            {specks, "a stray one lies far off"},
                            {huge, "diameter of 130000 m"},
                            {tiny, "Check the unit"},
-                           {overflowing, "Check the unit"}};
+                           {overflowing, "Check the unit"},
+                           {folded, "doubled faces"}};
   EXPECT_TRUE(check_mesh(good).ok());
   for (const Refused& refused : cases) {
     const absl::Status status = check_mesh(refused.mesh);
