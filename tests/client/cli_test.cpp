@@ -70,6 +70,7 @@ v1::DetectResponse one_part(const v1::DetectRequest& request) {
   part.mutable_pose()->mutable_orientation()->set_w(0.70710678118654757);
   part.set_score(0.875);
   part.set_visible_fraction(0.5);
+  part.set_confidence(1);
   response.mutable_stats()->set_total_seconds(0.0235);
   return response;
 }
@@ -156,10 +157,23 @@ TEST_F(Cli, DetectPrintsATableOfPosesInMillimetresAndDegrees) {
   server_.answer = one_part;
   const Output output = run("detect --model gear --unit mm --scene", {file("bin.pcd", "#")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
-  EXPECT_EQ(output.out, path("bin.pcd") +
-                            ": 1 found in 23.5 ms\n"
-                            "rank  model  x mm  y mm    z mm  roll deg  pitch deg  yaw deg  score  visible\n"
-                            "   1  gear   1.25  0.00  500.00       0.0        0.0     90.0  0.875     0.50\n");
+  EXPECT_EQ(output.out,
+            path("bin.pcd") +
+                ": 1 found in 23.5 ms\n"
+                "rank  model  x mm  y mm    z mm  roll deg  pitch deg  yaw deg  score  visible  confidence\n"
+                "   1  gear   1.25  0.00  500.00       0.0        0.0     90.0  0.875     0.50        1.00\n");
+}
+
+TEST_F(Cli, DetectSaysWhichPosesAreAmbiguous) {
+  server_.answer = [](const v1::DetectRequest& request) {
+    v1::DetectResponse response = one_part(request);
+    *response.add_hypotheses() = response.hypotheses(0);
+    response.mutable_hypotheses(1)->set_confidence(0.625);
+    *response.mutable_hypotheses(1)->add_variants() = response.hypotheses(0).pose();
+    return response;
+  };
+  EXPECT_THAT(run("detect --model gear --unit mm --scene", {file("bin.pcd", "#")}).out,
+              AllOf(HasSubstr("        0.63\n"), HasSubstr("warning: ambiguous: 2 may")));
 }
 
 TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
@@ -170,7 +184,7 @@ TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
 TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   const Output output =
       run("detect --model gear bolt --unit mm --max-results 5 --min-score 0 --start-point-share 0.5 "
-          "--normal-tolerance 15 --keep-support-plane --scene",
+          "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --scene",
           {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
   EXPECT_EQ(server_.stream_count(), 1);
@@ -182,10 +196,29 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   EXPECT_THAT(request.model_ids(), ::testing::ElementsAre("gear", "bolt"));
   EXPECT_EQ(request.params().max_results(), 5u);
   EXPECT_TRUE(request.params().has_min_score());
+  EXPECT_EQ(request.params().max_rejected(), 7u);
   EXPECT_EQ(request.params().start_point_share(), 0.5);
   EXPECT_EQ(request.params().normal_tolerance_degrees(), 15);
   EXPECT_TRUE(request.params().has_remove_support_plane());
   EXPECT_FALSE(request.params().remove_support_plane());
+}
+
+TEST_F(Cli, ViewDrawsTheResultOfOneDetection) {
+  if (run("detect --help").out.find("not in this build") != std::string::npos) GTEST_SKIP() << "built without viewer";
+  server_.answer = [](const v1::DetectRequest& request) {
+    v1::DetectResponse response = one_part(request);
+    *response.add_rejected() = response.hypotheses(0);
+    response.mutable_rejected(0)->set_score(0.125);
+    return response;
+  };
+  const std::string detect = "detect --model gear --unit mm --view " + path("page.html");
+  const Output output = run(detect + " --scene", {file("bin.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  ASSERT_EQ(server_.detect_requests().size(), 1U);
+  EXPECT_GT(server_.detect_requests()[0].params().max_rejected(), 0U);
+  EXPECT_THAT(files_.read("page.html"), AllOf(HasSubstr("\"score\":0.875"), HasSubstr("\"score\":0.125")));
+  run(detect + " --max-rejected 0 --scene", {path("bin.pcd")});
+  EXPECT_EQ(server_.detect_requests().at(1).params().max_rejected(), 0U);
 }
 
 TEST_F(Cli, DetectAsJsonPrintsOneAnswerALineInTheOrderOfTheScenes) {
@@ -199,6 +232,21 @@ TEST_F(Cli, DetectAsJsonPrintsOneAnswerALineInTheOrderOfTheScenes) {
   EXPECT_EQ(answers[1].hypotheses(0).score(), 0.875);
   EXPECT_THAT(output.out,
               AllOf(HasSubstr("\"visibleFraction\":0.5"), HasSubstr("\"totalSeconds\":0.0235"), HasSubstr("\"y\":0,")));
+}
+
+TEST_F(Cli, ABatchShowsItsProgressOnATerminalWhenItsAnswersGoElsewhere) {
+  const std::string detect = "detect --model gear --unit mm --scene " + file("a.pcd", "#") + " " + file("b.pcd", "#");
+  const auto typed = [&](const std::string& arguments) {
+    const std::string command = "BINPOSE_SERVER=" + server_.address() + " script -qec '" BINPOSE_COMMAND " " +
+                                arguments + "' " + path("typed") + " >/dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
+    return files_.read("typed");
+  };
+  EXPECT_THAT(typed(detect + " >" + path("answers")),
+              AllOf(HasSubstr("] 50 % " + path("a.pcd")), HasSubstr("] 100 %")));
+  EXPECT_THAT(files_.read("answers"), AllOf(HasSubstr("b.pcd: nothing found"), Not(HasSubstr("%"))));
+  EXPECT_THAT(typed(detect), AllOf(HasSubstr("b.pcd: nothing found"), Not(HasSubstr("] 50 %")))) << "one or the other";
+  EXPECT_THAT(run(detect).err, IsEmpty());
 }
 
 TEST_F(Cli, AFailingSceneIsReportedAndTheOthersGoOn) {

@@ -172,6 +172,25 @@ TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
   for (const PoseHypothesis& h : result.hypotheses) EXPECT_GE(h.score, 0.6);
 }
 
+TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
+  const Model model = testing::quick_model(testing::l_block());
+  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  DetectParams params;
+  params.min_score = 0.6;
+  const DetectResult plain = *search(cloud, model, params);
+  params.max_rejected = 5;
+  const DetectResult result = *search(cloud, model, params);
+  EXPECT_TRUE(plain.rejected.empty());
+  ASSERT_FALSE(result.rejected.empty());
+  EXPECT_LE(result.rejected.size(), 5U);
+  for (const PoseHypothesis& h : result.rejected) EXPECT_LT(h.score, 0.6);
+  ASSERT_EQ(result.hypotheses.size(), plain.hypotheses.size());
+  for (std::size_t i = 0; i < plain.hypotheses.size(); ++i) {
+    EXPECT_EQ(result.hypotheses[i].score, plain.hypotheses[i].score);
+    EXPECT_EQ(result.hypotheses[i].occluded_by, plain.hypotheses[i].occluded_by);
+  }
+}
+
 TEST(Detect, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
   const Model model = testing::quick_model(testing::l_block());
   const PointCloud cloud = testing::render(four_blocks(), sensor());
