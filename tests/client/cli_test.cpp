@@ -382,19 +382,57 @@ TEST_F(Cli, WatchOfNoFolderExitsWith3) {
   EXPECT_EQ(run("watch --model gear --unit mm --dir", {path("missing")}).exit_code, 3);
 }
 
-TEST_F(Cli, TheShellCompletesCommandsOptionsWordsAndModels) {
-  const auto complete = [&](const std::string& words, int last) {
-    const std::string script = "PATH=$(dirname " BINPOSE_COMMAND "):$PATH BINPOSE_SERVER=" + server_.address() +
-                               " bash -c 'source <(binpose completion); COMP_WORDS=(" + words +
-                               "); COMP_CWORD=" + std::to_string(last) + "; _binpose; echo \"${COMPREPLY[@]}\"' >" +
-                               path("completed");
-    EXPECT_EQ(std::system(script.c_str()), 0);  // NOLINT(cert-env33-c)
+/// What the shell prints for a script, with the command in its path and the server in its environment.
+class Completion : public Cli {
+ protected:
+  std::string run_in(const std::string& shell, const std::string& script) {
+    const std::string command = "PATH=$(dirname " BINPOSE_COMMAND "):$PATH BINPOSE_SERVER=" + server_.address() +
+                                " TERM=dumb timeout 60 " + shell + " " + file("script", script) + " >" +
+                                path("completed") + " 2>&1";
+    EXPECT_EQ(std::system(command.c_str()), 0) << shell;  // NOLINT(cert-env33-c)
     return files_.read("completed");
+  }
+};
+
+TEST_F(Completion, OfBashKnowsCommandsOptionsWordsAndModels) {
+  const auto complete = [&](const std::string& words, int last) {
+    return run_in("bash", "source <(binpose completion); COMP_WORDS=(" + words +
+                              "); COMP_CWORD=" + std::to_string(last) + "; _binpose; echo \"${COMPREPLY[@]}\"");
   };
   EXPECT_EQ(complete("binpose det", 1), "detect\n");
   EXPECT_EQ(complete("binpose detect --min", 2), "--min-score\n");
   EXPECT_EQ(complete("binpose train --unit m", 3), "m mm\n");
   EXPECT_EQ(complete("binpose detect --model ge", 3), "gear\n");
+}
+
+TEST_F(Completion, OfFishKnowsThemTooAndDescribesThem) {
+  const auto complete = [&](const std::string& line) {
+    return run_in("fish --no-config", "binpose completion --shell fish | source; complete -C '" + line + "'");
+  };
+  EXPECT_THAT(complete("binpose det"), StartsWith("detect\tFind parts"));
+  EXPECT_THAT(complete("binpose detect --min"), StartsWith("--min-score\tLeave out"));
+  EXPECT_THAT(complete("binpose train --unit "), AllOf(HasSubstr("m\t"), HasSubstr("mm\t")));
+  EXPECT_THAT(complete("binpose detect --model ge"), StartsWith("gear\t"));
+  EXPECT_THAT(complete("binpose delete ge"), StartsWith("gear"));
+}
+
+TEST_F(Completion, OfZshIsTypedByTheTabulator) {
+  // A shell that believes itself at a terminal; each zpty -r waits for its pattern.
+  const auto complete = [&](const std::string& typed, const std::string& pattern) {
+    return run_in("zsh -f",
+                  "zmodload zsh/zpty && zpty shell zsh -fi\n"
+                  "zpty -w shell 'PS1=; autoload -U compinit && compinit -u -D &&"
+                  " source <(binpose completion --shell zsh); echo rea\\dy'\n"
+                  "zpty -r shell out '*ready*'\n"
+                  "zpty -w -n shell '" +
+                      typed +
+                      "'$'\\t'\n"
+                      "zpty -r shell out '*" +
+                      pattern + "*' && print done");
+  };
+  EXPECT_EQ(complete("binpose det", "detect"), "done\n");
+  EXPECT_EQ(complete("binpose detect --min", "--min-score"), "done\n");
+  EXPECT_EQ(complete("binpose detect --model ge", "gear"), "done\n");
 }
 
 TEST_F(Cli, ServerOnTheCommandLineOverridesTheEnvironment) {
