@@ -138,10 +138,10 @@ class PartList {
   row(hypothesis, i) {
     const colour = scoreColour(hypothesis.score).getStyle();
     const bar = element("span", { class: "bar" }, element("i", { style: { width: `${100 * hypothesis.score}%`, background: colour } }));
-    const name = element("span", { class: "name" }, hypothesis.modelId);
-    if (doubtOf(hypothesis)) name.append(element("small", {}, doubtOf(hypothesis)));
-    const button = element("button", { type: "button" }, element("span", { class: "rank" }, `${i + 1}`), name, bar, element("span", { class: "number" }, hypothesis.score.toFixed(3)),
+    const button = element("button", { type: "button" }, element("span", { class: "rank" }, `${i + 1}`),
+      element("span", { class: "name" }, hypothesis.modelId), bar, element("span", { class: "number" }, hypothesis.score.toFixed(3)),
       element("span", { class: "number" }, percent(hypothesis.visibleFraction)));
+    if (doubtOf(hypothesis)) button.append(element("span", { class: "doubt" }, doubtOf(hypothesis)));
     button.addEventListener("click", () => this.select(i));
     return element("article", { class: "part" }, button);
   }
