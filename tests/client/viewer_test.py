@@ -34,6 +34,22 @@ def write_box(path, x, y, z):
         "endloop\nendfacet\n" for triangle in triangles) + "endsolid box\n")
 
 
+def write_scene_four_times_as_dense(folder):
+    """The sample scene with each pixel of its depth image as four; returns how many were measured."""
+    import numpy as np
+    from PIL import Image
+    folder.mkdir()
+    depth = np.kron(np.asarray(Image.open(SCENE / "depth.png")), np.ones((2, 2), np.uint16)).astype(np.uint16)
+    Image.fromarray(depth).save(folder / "depth.png")
+    camera = json.loads((SCENE / "camera.json").read_text())
+    for name in ["width", "height", "fx", "fy"]:
+        camera[name] *= 2
+    for name in ["cx", "cy"]:
+        camera[name] = 2 * camera[name] + 0.5
+    (folder / "camera.json").write_text(json.dumps(camera))
+    return int((depth > 0).sum())
+
+
 def parts_of_a_page(path):
     """The text of a page before, of, and after its data."""
     return re.match(r'(.*<script type="application/json" id="data">)(.*?)(</script>.*)', path.read_text(), re.DOTALL).groups()
@@ -239,6 +255,16 @@ class ViewerTest(unittest.TestCase):
         self.open(page)
         self.assertEqual(self.find(".part"), [])
         self.assertEqual(self.text("#warnings"), answer["warnings"][0])
+
+    def test_opens_with_more_than_300_000_points(self):
+        scene, page = self.folder / "dense", self.folder / "dense.html"
+        count = write_scene_four_times_as_dense(scene)
+        self.assertGreater(count, 300_000)
+        self.server.binpose_json("detect", "--model", "part", "--scene", scene, "--unit", "mm", "--view", page)
+        self.open(page)
+        print(f"{count} points: drawn after {self.driver.execute_script('return performance.now()') / 1000:.1f} s")
+        self.assertIn(f"{count:,} points", self.text("#summary"))
+        self.assertGreater(self.colours()[0], 500)
 
     def test_names_are_text_and_never_markup(self):
         scene = self.folder / "<img src=x onerror=alert(1)> <!--<script>"

@@ -1,5 +1,6 @@
 """What deploy/ configures, held to the server: its metrics, its options, and the tools that read these files."""
 
+import itertools
 import json
 import re
 import socket
@@ -125,6 +126,23 @@ class PrometheusTest(unittest.TestCase):
             file.flush()
             check = run("promtool", "check", "rules", file.name)
         self.assertEqual(check.returncode, 0, check.stdout + check.stderr)
+
+
+class GrafanaTest(unittest.TestCase):
+    def test_panels_lie_beside_each_other_in_24_columns(self):
+        taken = {}
+        for panel in DASHBOARD["panels"]:
+            place = panel["gridPos"]
+            self.assertLessEqual(place["x"] + place["w"], 24, panel["title"])
+            for cell in itertools.product(range(place["x"], place["x"] + place["w"]), range(place["y"], place["y"] + place["h"])):
+                self.assertNotIn(cell, taken, f"{panel['title']} lies on {taken.get(cell)}")
+                taken[cell] = panel["title"]
+
+    def test_panels_and_their_queries_have_names_of_their_own(self):
+        self.assertEqual(len({panel["id"] for panel in DASHBOARD["panels"]}), len(DASHBOARD["panels"]))
+        for panel in DASHBOARD["panels"]:
+            names = [target["refId"] for target in panel["targets"]]
+            self.assertEqual(len(set(names)), len(names), panel["title"])
 
 
 class Prometheus:
