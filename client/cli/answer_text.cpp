@@ -50,8 +50,8 @@ void print_ambiguous(const v1::DetectResponse& answer) {
   for (int i = 0; i < answer.hypotheses_size(); ++i) {
     if (answer.hypotheses(i).variants_size() > 0) ranks += (ranks.empty() ? "" : ", ") + std::to_string(i + 1);
   }
-  if (!ranks.empty())
-    print_warning("ambiguous: " + ranks + " may as well lie in one of the `variants` that --json lists.");
+  if (ranks.empty()) return;
+  print_warning("ambiguous: " + ranks + " may as well lie in one of the `variants` that --json lists.");
 }
 
 }  // namespace

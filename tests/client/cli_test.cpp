@@ -299,8 +299,17 @@ TEST_F(Cli, ModelsListsShowsAndDeletes) {
   EXPECT_THAT(run("models --json").out, HasSubstr("\"id\":\"gear\""));
 }
 
+TEST_F(Cli, ExportSaysWhereTheModelIs) {
+  EXPECT_EQ(run("export gear", {path("gear.model")}).out, "exported gear to " + path("gear.model") + "\n");
+  EXPECT_EQ(files_.read("gear.model"), "a model");
+  EXPECT_EQ(run("export --json gear", {path("gear.model")}).out,
+            "{\"file\":\"" + path("gear.model") + "\",\"fileBytes\":7}\n");
+  EXPECT_EQ(run("export gear", {path("missing/gear.model")}).exit_code, 3);
+}
+
 TEST_F(Cli, EveryCommandTeachesByExamples) {
-  for (const char* command : {"train", "detect", "model", "watch", "bench", "request", "completion"}) {
+  for (const char* command : {"train", "detect", "models", "model", "delete", "export", "import", "watch", "bench",
+                              "health", "request", "completion"}) {
     EXPECT_THAT(run(std::string(command) + " --help").out, HasSubstr("Examples:\n  ")) << command;
   }
 }
