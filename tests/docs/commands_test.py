@@ -169,6 +169,12 @@ class CoverageTest(unittest.TestCase):
         tests = re.findall(r'run_document\("(.*)"\)', Path(__file__).read_text())
         self.assertEqual({name for name, text in self.documents.items() if console.steps_of(text)}, set(tests))
 
+    def test_the_quickstart_goes_through_the_steps_that_the_readme_shows(self):
+        script = (ROOT / "deploy/quickstart.sh").read_text()
+        steps = [text.replace("$part", "bearing_support") for text in re.findall(r'^heading "(.*)"', script, re.MULTILINE)]
+        [shown] = [step.output for step in console.steps_of(self.documents["README.md"]) if "quickstart" in step.command]
+        self.assertEqual([line.removeprefix("== ") for line in shown if line.startswith("== ")], steps)
+
     def test_every_reason_not_to_run_a_command_is_needed(self):
         commands = [step.command for text in self.documents.values() for step in console.steps_of(text)]
         for pattern, _ in NOT_HERE:
