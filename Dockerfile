@@ -13,7 +13,7 @@ FROM debian:bookworm-slim AS runtime
 COPY deploy/install-packages.sh /tmp/
 RUN /tmp/install-packages.sh run && rm -rf /tmp/install-packages.sh /var/lib/apt/lists/* /var/cache/apt/* \
   && useradd --system --no-create-home --uid 10001 binpose && install -d -o binpose /models
-# For HEALTHCHECK, and for whoever looks into a container.
+# For whoever looks into a container, too.
 COPY --from=build /src/build/release/bin/binpose /usr/local/bin/
 LABEL org.opencontainers.image.title="binpose" \
   org.opencontainers.image.description="Finds known parts in point clouds" \
@@ -28,6 +28,8 @@ COPY --from=build /src/build/release/bin/binpose-server /usr/local/bin/
 VOLUME /models
 EXPOSE 50051 9464
 STOPSIGNAL SIGTERM
-HEALTHCHECK --interval=10s --timeout=3s --start-period=60s CMD ["binpose", "health", "--timeout", "2"]
-# A container's network is closed unless its ports are published: publish to loopback, or mount --tls-cert and --tls-key.
-ENTRYPOINT ["binpose-server", "--listen", "0.0.0.0:50051", "--insecure", "--metrics", "0.0.0.0:9464", "--model-dir", "/models"]
+# The health check reads the same variables. A container's network is closed unless its ports are published: publish to
+# loopback, or mount a certificate and say BINPOSE_TLS_CERT and BINPOSE_TLS_KEY.
+ENV BINPOSE_LISTEN=0.0.0.0:50051 BINPOSE_METRICS=0.0.0.0:9464 BINPOSE_MODEL_DIR=/models BINPOSE_INSECURE=true
+HEALTHCHECK --interval=10s --timeout=3s --start-period=60s CMD ["binpose-server", "--healthcheck"]
+ENTRYPOINT ["binpose-server"]

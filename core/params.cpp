@@ -79,6 +79,7 @@ absl::Status validate(const TrainParams& params) {
 absl::Status validate(const DetectParams& params) {
   return first_error({in_range("min_score", params.min_score, 0, 1),
                       in_range("max_results", params.max_results, 1, 1000),
+                      in_range("max_rejected", params.max_rejected, 0, 1000),
                       in_range("cluster_limit", params.cluster_limit, 1, 100000),
                       in_range("start_point_share", params.start_point_share, 0.001, 1),
                       in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180)});

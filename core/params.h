@@ -54,6 +54,7 @@ enum class Verification {
 struct DetectParams {
   double min_score = 0.25;                 ///< [0, 1]
   int max_results = 100;                   ///< [1, 1000]
+  int max_rejected = 0;                    ///< best poses below min_score that are answered apart, [0, 1000]
   double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;

@@ -1,6 +1,7 @@
 #!/bin/sh
-# From a fresh Debian 12 to ranked poses and a picture of them: installs what is missing, builds, starts a server on a free port, trains the
-# sample part, detects it in the sample scan and stops the server. Leaves nothing behind but packages and build/.
+# From a fresh Debian 12 to ranked poses and a picture of them: installs what is missing, builds, starts a server on a
+# free port, trains the sample part, detects it in the sample scan, stops the server, and says where the picture is.
+# Leaves nothing behind but packages and build/.
 set -eu
 cd "$(dirname "$0")/.."
 bin=build/release/bin
@@ -47,9 +48,11 @@ heading "Train $part"
 
 heading "Detect"
 scene=tests/data/scenes/${part}_01
+picture=""
 set -- --model $part --scene "$scene" --unit mm
 if [ -s build/release/client/viewer/page.html ]; then
-  set -- "$@" --view build/quickstart.html --mesh tests/data/parts/$part.stl --mesh-unit mm --truth "$scene/gt.json"
+  picture=build/quickstart.html
+  set -- "$@" --view $picture --mesh tests/data/parts/$part.stl --mesh-unit mm --truth "$scene/gt.json"
 fi
 "$bin/binpose" detect "$@"
 
@@ -58,3 +61,10 @@ kill "$server"
 wait "$server"
 server=""
 echo "server ended, its models are removed"
+
+heading "Picture"
+if [ -n "$picture" ]; then
+  echo "open in a browser: file://$PWD/$picture"
+else
+  echo "none: npm could not fetch three.js. Where it can, start this again."
+fi

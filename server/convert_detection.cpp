@@ -61,6 +61,7 @@ absl::StatusOr<DetectParams> to_detect_params(const v1::DetectParams& message) {
   DetectParams params;
   if (message.has_min_score()) params.min_score = message.min_score();
   if (message.has_max_results()) params.max_results = saturate(message.max_results());
+  if (message.has_max_rejected()) params.max_rejected = saturate(message.max_rejected());
   if (message.has_start_point_share()) params.start_point_share = message.start_point_share();
   if (message.has_normal_tolerance_degrees()) params.normal_tolerance = message.normal_tolerance_degrees() * kDegree;
   if (message.has_remove_support_plane()) params.remove_support_plane = message.remove_support_plane();
@@ -74,6 +75,9 @@ v1::DetectResponse to_response(const DetectResult& result,
   v1::DetectResponse message;
   for (const PoseHypothesis& hypothesis : result.hypotheses) {
     *message.add_hypotheses() = to_proto(hypothesis, model_ids[hypothesis.model_index], metres_per_unit);
+  }
+  for (const PoseHypothesis& hypothesis : result.rejected) {
+    *message.add_rejected() = to_proto(hypothesis, model_ids[hypothesis.model_index], metres_per_unit);
   }
   *message.mutable_stats() = to_proto(result.stats);
   for (const std::string& warning : result.warnings) message.add_warnings(warning);

@@ -141,6 +141,7 @@ v1::Model to_proto(const StoredModel& stored) {
   message.set_file_bytes(static_cast<std::uint32_t>(stored.file_bytes));
   message.mutable_create_time()->set_seconds(stored.create_time.time_since_epoch().count());
   for (const std::string& warning : model.warnings) message.add_warnings(warning);
+  for (const Pose& pose : model.similar_poses) *message.add_similar_poses() = to_proto(pose, 1);
   return message;
 }
 

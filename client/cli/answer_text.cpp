@@ -27,16 +27,31 @@ RollPitchYaw roll_pitch_yaw(const v1::Quaternion& q) {
 double millimetres_per(v1::LengthUnit unit) { return unit == v1::LENGTH_UNIT_METRE ? 1000 : 1; }
 
 Table table_of(const v1::DetectResponse& answer, double millimetres_per_unit) {
-  Table table = {{"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible"}};
+  Table table = {
+      {"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible", "confidence"}};
   for (const v1::PoseHypothesis& part : answer.hypotheses()) {
     const v1::Vector3& position = part.pose().position();
     const RollPitchYaw angles = roll_pitch_yaw(part.pose().orientation());
     table.push_back({std::to_string(table.size()), part.model_id(), fixed(position.x() * millimetres_per_unit, 2),
                      fixed(position.y() * millimetres_per_unit, 2), fixed(position.z() * millimetres_per_unit, 2),
                      fixed(angles.roll, 1), fixed(angles.pitch, 1), fixed(angles.yaw, 1), fixed(part.score(), 3),
-                     fixed(part.visible_fraction(), 2)});
+                     fixed(part.visible_fraction(), 2), fixed(part.confidence(), 2)});
   }
   return table;
+}
+
+void print_warning(const std::string& sentence) {
+  std::cout << coloured("warning: ", Colour::kYellow, stdout) << sentence << '\n';
+}
+
+/// Poses that the scan leaves open; one sentence for all.
+void print_ambiguous(const v1::DetectResponse& answer) {
+  std::string ranks;
+  for (int i = 0; i < answer.hypotheses_size(); ++i) {
+    if (answer.hypotheses(i).variants_size() > 0) ranks += (ranks.empty() ? "" : ", ") + std::to_string(i + 1);
+  }
+  if (ranks.empty()) return;
+  print_warning("ambiguous: " + ranks + " may as well lie in one of the `variants` that --json lists.");
 }
 
 }  // namespace
@@ -50,9 +65,8 @@ void print_answer(const v1::DetectResponse& answer, const std::string& scene, v1
   if (stats.stop_reason() == v1::STOP_REASON_MAX_RESULTS) std::cout << " (the best of more)";
   std::cout << '\n';
   if (count > 0) print(table_of(answer, millimetres_per(unit)), std::cout);
-  for (const std::string& warning : answer.warnings()) {
-    std::cout << coloured("warning: ", Colour::kYellow, stdout) << warning << '\n';
-  }
+  print_ambiguous(answer);
+  for (const std::string& warning : answer.warnings()) print_warning(warning);
   std::cout << std::flush;
 }
 

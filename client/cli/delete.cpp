@@ -22,6 +22,7 @@ ExitCode delete_model(const std::string& id, const GlobalOptions& global) {
 void add_delete(CLI::App& app, const GlobalOptions& global, Command& chosen) {
   const auto id = std::make_shared<std::string>();
   CLI::App& command = *app.add_subcommand("delete", "Delete a model");
+  command.footer("\nExamples:\n  binpose delete gear");
   command.add_option("id", *id, "Its ID")->required();
   command.callback([&chosen, id, &global] { chosen = [id, &global] { return delete_model(*id, global); }; });
 }

@@ -89,11 +89,12 @@ ExitCode exchange(const ScanOptions& options, bool json, DetectStream& stream) {
 /// Searches the one scene and draws what was found.
 ExitCode detect_and_draw(const ScanOptions& options, const ResultPageOptions& drawing, bool json, Client& client) {
   const std::string& scene = options.scenes.front();
-  const absl::StatusOr<v1::DetectRequest> request = make_request(options, scene);
+  absl::StatusOr<v1::DetectRequest> request = make_request(options, scene);
   if (!request.ok()) {
     report(request.status());
     return kUnreadable;
   }
+  if (!options.max_rejected.has_value()) request->mutable_params()->set_max_rejected(kRejectedOnPage);
   const absl::StatusOr<v1::DetectResponse> answer = client.detect(*request);
   if (!answer.ok()) return report_call({answer.status().code(), scene + ": " + std::string(answer.status().message())});
   if (json) {

@@ -23,9 +23,9 @@ ExitCode list_models(const GlobalOptions& global) {
 }  // namespace
 
 void add_models(CLI::App& app, const GlobalOptions& global, Command& chosen) {
-  app.add_subcommand("models", "List the models")->callback([&chosen, &global] {
-    chosen = [&global] { return list_models(global); };
-  });
+  CLI::App& command = *app.add_subcommand("models", "List the models");
+  command.footer("\nExamples:\n  binpose models\n  binpose models --json | jq -r .models[].id");
+  command.callback([&chosen, &global] { chosen = [&global] { return list_models(global); }; });
 }
 
 }  // namespace binpose::client::cli

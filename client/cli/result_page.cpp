@@ -11,25 +11,6 @@
 namespace binpose::client::cli {
 namespace {
 
-constexpr std::uint32_t kMostRejected = 30;
-
-/// The poses that a search without min_score adds to an answer.
-absl::StatusOr<v1::DetectResponse> find_rejected(v1::DetectRequest request, const v1::DetectResponse& answer,
-                                                 Client& client) {
-  constexpr std::uint32_t kMostResults = 1000;  // what the server takes
-  const auto found = static_cast<std::uint32_t>(answer.hypotheses_size());
-  request.mutable_params()->set_min_score(0);
-  request.mutable_params()->set_max_results(std::min(found + kMostRejected, kMostResults));
-  absl::StatusOr<v1::DetectResponse> all = client.detect(request);
-  if (!all.ok()) return all.status();
-  v1::DetectResponse rejected;
-  for (const v1::PoseHypothesis& hypothesis : all->hypotheses()) {
-    const bool is_answered = found > 0 && hypothesis.score() >= answer.hypotheses(static_cast<int>(found) - 1).score();
-    if (!is_answered) *rejected.add_hypotheses() = hypothesis;
-  }
-  return rejected;
-}
-
 /// What the page knows of a model: {model, shape, and its mesh if there is one}.
 absl::StatusOr<std::string> model_json(const ResultPageOptions& options, const v1::DetectRequest& request, int i,
                                        Client& client) {
@@ -94,8 +75,6 @@ absl::Status write_result_page(const ResultPageOptions& options, const v1::Detec
     if (!model.ok()) return model.status();
     models += (models.empty() ? "" : ",") + *model;
   }
-  const absl::StatusOr<v1::DetectResponse> rejected = find_rejected(request, answer, client);
-  if (!rejected.ok()) return rejected.status();
   std::string truth = "null";
   if (options.truth.has_value()) {
     const absl::StatusOr<std::string> text = read_truth(*options.truth);
@@ -103,8 +82,7 @@ absl::Status write_result_page(const ResultPageOptions& options, const v1::Detec
     truth = *text;
   }
   return write_page(*options.page, "{\"kind\":\"result\",\"request\":" + request_json(request) + ",\"answer\":" +
-                                       answer_json(answer) + ",\"rejected\":" + answer_json(*rejected) +
-                                       ",\"models\":[" + models + "],\"truth\":" + truth + "}");
+                                       answer_json(answer) + ",\"models\":[" + models + "],\"truth\":" + truth + "}");
 }
 
 }  // namespace binpose::client::cli

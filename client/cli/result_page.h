@@ -21,8 +21,11 @@ struct ResultPageOptions {
 
 void add_result_page_options(CLI::App& command, ResultPageOptions& options);
 
-/// Writes the page of a result. Asks the server for the models and, with a second search, for the poses that scored too
-/// little. Errors: those of the calls, and of files that cannot be read or written.
+/// Poses below min_score that a page shows, unless the user asked for another number.
+inline constexpr std::uint32_t kRejectedOnPage = 30;
+
+/// Writes the page of a result. Asks the server for the models. Errors: those of the calls, and of files that cannot be
+/// read or written.
 absl::Status write_result_page(const ResultPageOptions& options, const v1::DetectRequest& request,
                                const v1::DetectResponse& answer, Client& client);
 

@@ -18,6 +18,7 @@ struct ScanOptions {
   std::optional<std::string> camera;
   v1::LengthUnit unit = v1::LENGTH_UNIT_UNSPECIFIED;
   std::optional<std::uint32_t> max_results;
+  std::optional<std::uint32_t> max_rejected;
   std::optional<double> min_score;
   std::optional<double> start_point_share;
   std::optional<double> normal_tolerance_degrees;

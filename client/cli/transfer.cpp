@@ -1,3 +1,5 @@
+#include <google/protobuf/struct.pb.h>
+
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -19,9 +21,19 @@ ExitCode export_model(const Options& options, const GlobalOptions& global) {
   const absl::StatusOr<std::string> bytes = connect(global).export_model(options.id);
   if (!bytes.ok()) return report_call(bytes.status());
   std::ofstream file(options.file, std::ios::binary);
-  if (file.write(bytes->data(), static_cast<std::streamsize>(bytes->size())).flush()) return kOk;
-  report(absl::InternalError("Cannot write " + options.file + "."));
-  return kUnreadable;
+  if (!file.write(bytes->data(), static_cast<std::streamsize>(bytes->size())).flush()) {
+    report(absl::InternalError("Cannot write " + options.file + "."));
+    return kUnreadable;
+  }
+  if (global.json) {
+    google::protobuf::Struct written;
+    (*written.mutable_fields())["file"].set_string_value(options.file);
+    (*written.mutable_fields())["fileBytes"].set_number_value(static_cast<double>(bytes->size()));
+    std::cout << answer_json(written) << std::endl;
+  } else {
+    std::cout << "exported " << options.id << " to " << options.file << '\n';
+  }
+  return kOk;
 }
 
 ExitCode import_model(const Options& options, const GlobalOptions& global) {
@@ -40,10 +52,11 @@ ExitCode import_model(const Options& options, const GlobalOptions& global) {
   return kOk;
 }
 
-void add(CLI::App& app, const char* name, const char* help, const GlobalOptions& global, Command& chosen,
+void add(CLI::App& app, const std::string& name, const char* help, const GlobalOptions& global, Command& chosen,
          ExitCode (*run)(const Options&, const GlobalOptions&)) {
   const auto options = std::make_shared<Options>();
   CLI::App& command = *app.add_subcommand(name, help);
+  command.footer("\nExamples:\n  binpose " + name + " gear gear.model");
   command.add_option("id", options->id, "Its ID")->required();
   command.add_option("file", options->file, "The model file")->required();
   command.callback([&chosen, options, &global, run] { chosen = [=, &global] { return run(*options, global); }; });

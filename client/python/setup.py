@@ -26,4 +26,5 @@ class BuildWithStubs(build_py):
                        check=True)
 
 
-setup(packages=["binpose"], cmdclass={"build_py": BuildWithStubs})
+# Under src/, so that a Python started here finds the package that was built, and not this one without its stubs.
+setup(package_dir={"": "src"}, packages=["binpose"], cmdclass={"build_py": BuildWithStubs})

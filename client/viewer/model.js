@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { gradientOf, observabilityColour } from "./colour.js";
 import { addSwitch, element, facts, onKey, sayKeys, warn } from "./panel.js";
-import { Stage, frameLines } from "./stage.js";
+import { Stage, frameLines, labelAt } from "./stage.js";
 import { DISC_RADIUS, bytesOf, discs, floatsOf, matrixOf, vectorOf } from "./wire.js";
 
 const PAIRS_AT_FIRST = 40;
@@ -14,7 +14,7 @@ export function showModel({ model, shape }) {
   const centre = vectorOf(model.boundingBoxMin, 500).add(vectorOf(model.boundingBoxMax, 500));
   const surface = observabilityMap(shape, diameter);
   const pairs = pairLines(shape);
-  const symmetry = symmetryLines(model.symmetry ?? {}, centre, diameter);
+  const symmetry = symmetryLines(model, centre, diameter);
   const frame = frameLines(0.5 * diameter);
   stage.scene.add(surface, pairs, symmetry, frame);
 
@@ -24,7 +24,7 @@ export function showModel({ model, shape }) {
   addSwitch(stage, "f", "Frame", frame);
   describe(stage, model, pairs, symmetry);
 
-  const home = (tilt) => stage.look(centre, 0.56 * diameter, tilt);
+  const home = (tilt) => stage.look(centre, (symmetry.children.length ? 0.68 : 0.56) * diameter, tilt);
   onKey("0", () => home(0));
   onKey("1", () => home(OBLIQUE));
   onKey("ArrowLeft", () => stage.turn(-10));
@@ -71,27 +71,44 @@ function pairLines(shape) {
   return lines;
 }
 
-/** An axis of revolution, and the axis of every turn that leaves the part as it was. */
-function symmetryLines(symmetry, centre, diameter) {
+/** An axis of revolution, and the axes of the turns that leave the part as it was, or nearly so. */
+function symmetryLines({ symmetry = {}, similarPoses }, centre, diameter) {
   const lines = new THREE.Group();
-  const add = (point, direction, colour, name) => {
+  const add = ({ point, direction }, colour, name) => {
     const from = point.clone().addScaledVector(direction, direction.dot(centre.clone().sub(point)));
-    const ends = [-0.75, 0.75].map((share) => from.clone().addScaledVector(direction, share * diameter));
+    const upwards = Math.sign(direction.z || direction.y || direction.x); // there the name stands
+    const ends = [-0.6, 0.6].map((share) => from.clone().addScaledVector(direction, upwards * share * diameter));
     const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends),
       new THREE.LineDashedMaterial({ color: colour, dashSize: 0.04 * diameter, gapSize: 0.02 * diameter }));
     line.computeLineDistances();
     line.name = name;
+    line.add(labelAt(ends[1], name, colour));
     lines.add(line);
   };
   if (symmetry.axis) {
-    const direction = vectorOf(symmetry.axis.direction).normalize();
-    add(vectorOf(symmetry.axis.point, 1000), direction, "#ffd166", "any turn");
+    add({ point: vectorOf(symmetry.axis.point, 1000), direction: vectorOf(symmetry.axis.direction).normalize() }, "#ffd166", "any turn");
   }
-  for (const pose of symmetry.discrete ?? []) {
-    const turn = turnOf(matrixOf(pose, 1000));
-    if (turn) add(turn.point, turn.direction, "#8ce99a", `${turn.degrees.toFixed(0)}°`);
+  for (const axis of axesOf(symmetry.discrete, diameter)) add(axis, "#8ce99a", `${axis.degrees.length + 1}-fold`);
+  for (const axis of axesOf(similarPoses, diameter)) {
+    add(axis, "#ff9f68", `nearly, ${axis.degrees.map((angle) => `${angle.toFixed(0)}°`).join(" ")}`);
   }
   return lines;
+}
+
+/** The turns of a list of motions, by the axes that they share. */
+function axesOf(poses, diameter) {
+  const axes = [];
+  for (const pose of poses ?? []) {
+    const turn = turnOf(matrixOf(pose, 1000));
+    if (!turn) continue;
+    const isShared = ({ point, direction }) => Math.abs(direction.dot(turn.direction)) > 0.999 &&
+      turn.point.clone().sub(point).cross(direction).length() < 0.02 * diameter;
+    const axis = axes.find(isShared);
+    if (!axis) axes.push({ ...turn, degrees: [turn.degrees] });
+    else axis.degrees.push(axis.direction.dot(turn.direction) > 0 ? turn.degrees : 360 - turn.degrees);
+  }
+  for (const { degrees } of axes) degrees.sort((a, b) => a - b);
+  return axes;
 }
 
 /** Axis and angle of a rigid motion; nothing for the identity. */
@@ -135,7 +152,14 @@ function describe(stage, model, pairs, symmetry) {
     ["box", `${size.toArray().map((v) => v.toFixed(1)).join(" x ")} mm`],
     ["points", `${model.pointCount}`],
     ["vector pairs", `${model.pairCount}`],
-    ["symmetry", symmetry.children.map((line) => line.name).join(", ") || "none"],
+    ["symmetry", countEach(symmetry.children.map((line) => line.name)) || "none"],
     ["content hash", model.contentHash],
   ]));
+}
+
+/** "6-fold, 2-fold x 6" of a list of names. */
+function countEach(names) {
+  const counts = new Map();
+  for (const name of names) counts.set(name, (counts.get(name) ?? 0) + 1);
+  return [...counts].map(([name, count]) => (count > 1 ? `${name} x ${count}` : name)).join("; ");
 }

@@ -47,7 +47,7 @@ export function sayKeys(pairs) {
 
 /** Name and value, row by row. */
 export function facts(pairs) {
-  return element("dl", {}, ...pairs.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+  return element("dl", {}, ...pairs.flatMap(([name, value]) => [element("dt", {}, name), element("dd", { "data-fact": name }, value)]));
 }
 
 export function warn(sentences) {

@@ -20,7 +20,7 @@ export function showResult(data) {
   const points = cloudPoints(stage, cloud, sensor, MEASURED_PART * smallest);
   const shapes = new Map(data.models.map((entry) => [entry.model.id, new PartShape(entry)]));
   const found = group(data.answer.hypotheses, (h) => shapes.get(h.modelId).solid(matrixOf(h.pose, unit), scoreColour(h.score)));
-  const rejected = group(data.rejected.hypotheses, (h) => shapes.get(h.modelId).outline(matrixOf(h.pose, unit), "#ff5d8f", 0.18));
+  const rejected = group(data.answer.rejected, (h) => shapes.get(h.modelId).outline(matrixOf(h.pose, unit), "#ff5d8f", 0.18));
   const truth = group(data.truth?.instances, (t) => [...shapes.values()][0].outline(new THREE.Matrix4().set(...t.pose), "#ffffff", 0));
   stage.scene.add(points, found, rejected, truth);
 
@@ -116,7 +116,8 @@ class PartList {
     Object.assign(this, { stage, found, shapes, unit, hypotheses: data.answer.hypotheses ?? [], selected: null });
     this.frame = frameLines(1);
     this.frame.visible = false;
-    stage.scene.add(this.frame);
+    this.variants = new THREE.Group(); // of the selected part: the poses that the scan leaves open
+    stage.scene.add(this.frame, this.variants);
     this.rows = this.hypotheses.map((hypothesis, i) => this.row(hypothesis, i));
   }
 
@@ -140,6 +141,7 @@ class PartList {
     const button = element("button", { type: "button" }, element("span", { class: "rank" }, `${i + 1}`),
       element("span", { class: "name" }, hypothesis.modelId), bar, element("span", { class: "number" }, hypothesis.score.toFixed(3)),
       element("span", { class: "number" }, percent(hypothesis.visibleFraction)));
+    if (doubtOf(hypothesis)) button.append(element("span", { class: "doubt" }, doubtOf(hypothesis)));
     button.addEventListener("click", () => this.select(i));
     return element("article", { class: "part" }, button);
   }
@@ -158,6 +160,7 @@ class PartList {
       part.material.needsUpdate = true;
     });
     this.frame.visible = i !== null;
+    this.variants.clear();
     if (i !== null) this.showSelected(i);
     this.stage.render();
   }
@@ -167,7 +170,11 @@ class PartList {
     row.setAttribute("aria-current", "true");
     row.append(facts(factsOf(this.hypotheses[i], this.unit)));
     row.scrollIntoView({ block: "nearest" });
-    const { surface, model } = this.shapes.get(this.hypotheses[i].modelId);
+    const shape = this.shapes.get(this.hypotheses[i].modelId);
+    for (const pose of this.hypotheses[i].variants ?? []) {
+      this.variants.add(shape.outline(matrixOf(pose, this.unit), "#ffd166", 0.12));
+    }
+    const { surface, model } = shape;
     this.frame.position.copy(part.position);
     this.frame.quaternion.copy(part.quaternion);
     this.frame.scale.setScalar(500 * model.diameter);
@@ -177,6 +184,12 @@ class PartList {
 
 const percent = (share) => `${(100 * (share ?? 0)).toFixed(0)} %`;
 
+/** What keeps a pose from being sure; empty if nothing does. */
+function doubtOf({ variants, confidence = 1 }) {
+  if (variants?.length) return `ambiguous, ${percent(confidence)} sure`;
+  return confidence < 0.995 ? `${percent(confidence)} sure` : "";
+}
+
 function factsOf(h, unit) {
   const position = vectorOf(h.pose.position, unit).toArray();
   const { x = 0, y = 0, z = 0, w = 0 } = h.pose.orientation;
@@ -185,9 +198,12 @@ function factsOf(h, unit) {
     ["quaternion", [x, y, z, w].map((v) => v.toFixed(4)).join("  ")],
     ["explained", percent(h.explainedFraction)],
     ["seen through", percent(h.violatedFraction)],
+    ["other surface", percent(h.unexplainedFraction)],
     ["residual", `${((h.residual ?? 0) * unit).toFixed(2)} mm`],
-    ["votes", (h.votes ?? 0).toFixed(0)],
+    ["votes", (h.votes ?? 0).toPrecision(3)],
+    ["confidence", percent(h.confidence)],
   ];
+  if (h.variants?.length) list.push(["could also lie", `as outlined (${h.variants.length})`]);
   if (h.occludedBy?.length) list.push(["take first", h.occludedBy.map((other) => `#${other + 1}`).join(" ")]);
   return list;
 }

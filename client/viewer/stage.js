@@ -76,9 +76,11 @@ export class Stage {
   /** Calls `act` with the nearest of `objects` under a click or tap, or with nothing. */
   onPick(objects, act) {
     let down = null;
-    this.canvas.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
+    // The second finger of a pinch is not primary.
+    this.canvas.addEventListener("pointerdown", (event) => (down = event.isPrimary ? [event.clientX, event.clientY] : null));
     this.canvas.addEventListener("pointerup", (event) => {
-      if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 5) return; // a drag
+      const still = event.pointerType === "touch" ? 12 : 5; // pixels: fingers roll
+      if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > still) return; // a drag
       const box = this.canvas.getBoundingClientRect();
       const ray = new THREE.Raycaster();
       const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1,
@@ -154,4 +156,23 @@ export function frameLines(length) {
   lines.material.depthTest = false;
   lines.renderOrder = 1;
   return lines;
+}
+
+/** Words at a place, upright and of the same size from wherever they are looked at. */
+export function labelAt(place, text, colour) {
+  const kHeight = 0.022; // of the picture's, per unit of distance
+  const context = document.createElement("canvas").getContext("2d");
+  const font = "600 44px system-ui, sans-serif";
+  context.font = font;
+  const { canvas } = context;
+  [canvas.width, canvas.height] = [Math.ceil(context.measureText(text).width) + 16, 60];
+  Object.assign(context, { font, fillStyle: colour, textBaseline: "middle" });
+  context.fillText(text, 8, canvas.height / 2);
+  const map = new THREE.CanvasTexture(canvas);
+  map.colorSpace = THREE.SRGBColorSpace;
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false, sizeAttenuation: false }));
+  sprite.scale.set((kHeight * canvas.width) / canvas.height, kHeight, 1);
+  sprite.center.set(0.5, 0);
+  sprite.position.copy(place);
+  return sprite;
 }

@@ -56,7 +56,7 @@ function depthPoints(depth, scale) {
 }
 
 /** Radius of a disc, in diameters: model points are 0.015 apart or somewhat more, and discs shall leave no gaps. */
-export const DISC_RADIUS = 0.0155;
+export const DISC_RADIUS = 0.0165;
 
 /** A part's surface in the model frame, flat shaded: its mesh where there is one, else a disc for each model point. */
 export function surfaceOf({ mesh, shape, model }) {
@@ -89,10 +89,10 @@ function objGeometry(text) {
   return new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
 }
 
-/** One hexagon of that radius across the normal of each point. Points are metres; `radius` is millimetres. */
+/** One decagon of that radius across the normal of each point. Points are metres; `radius` is millimetres. */
 export function discs(points, normals, radius) {
   const count = points.length / 3;
-  const kCorners = 6;
+  const kCorners = 10;
   const position = new Float32Array(count * kCorners * 3);
   const normal = new Float32Array(count * kCorners * 3);
   const index = [];
@@ -102,7 +102,7 @@ export function discs(points, normals, radius) {
     a.set(...(Math.abs(n.x) < 0.6 ? [1, 0, 0] : [0, 1, 0])).cross(n).setLength(radius);
     b.copy(n).cross(a);
     for (let k = 0; k < kCorners; ++k) {
-      const [c, s] = [Math.cos((k * Math.PI) / 3), Math.sin((k * Math.PI) / 3)];
+      const [c, s] = [Math.cos((2 * k * Math.PI) / kCorners), Math.sin((2 * k * Math.PI) / kCorners)];
       const at = 3 * (kCorners * i + k);
       position[at] = 1000 * points[3 * i] + c * a.x + s * b.x;
       position[at + 1] = 1000 * points[3 * i + 1] + c * a.y + s * b.y;

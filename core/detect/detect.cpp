@@ -104,8 +104,11 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
 
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    candidates = rank(finest, models, verification, std::move(candidates), params.min_score, control);
+    Ranking ranking =
+        rank(finest, models, verification, std::move(candidates), params.min_score, params.max_rejected, control);
     if (control.stop.stop_requested()) return control.status();
+    candidates = std::move(ranking.accepted);
+    for (const Candidate& candidate : ranking.rejected) result.rejected.push_back(to_hypothesis(candidate, finest));
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   if (candidates.size() > static_cast<std::size_t>(params.max_results)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace binpose {
@@ -47,48 +48,85 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
   return occluders;
 }
 
-}  // namespace
+/// Candidates in line for acceptance, best first.
+class Line {
+ public:
+  Line(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
+       std::vector<Candidate> candidates, const RunControl& control)
+      : map_(map),
+        models_(models),
+        options_(options),
+        control_(control),
+        candidates_(std::move(candidates)),
+        owner_(map.points.size(), kNobody) {
+    std::stable_sort(candidates_.begin(), candidates_.end(), better);
+  }
 
-std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models,
-                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates, double min_score,
-                            const RunControl& control) {
-  const auto better = [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); };
-  std::stable_sort(candidates.begin(), candidates.end(), better);
-  std::vector<int> owner(map.points.size(), kNobody);
-  std::vector<Candidate> accepted;
-  std::size_t next = 0;
-  while (next < candidates.size() && candidates[next].score() >= min_score && !control.stop.stop_requested()) {
-    Candidate& candidate = candidates[next];
-    const Model& model = *models[candidate.model_index];
+  /// The next that score at least `min_score`, at most `limit` of them.
+  std::vector<Candidate> accept(double min_score, std::size_t limit) {
+    std::vector<Candidate> accepted;
+    while (next_ < candidates_.size() && accepted.size() < limit && candidates_[next_].score() >= min_score &&
+           !control_.stop.stop_requested()) {
+      if (!stands_firm()) continue;
+      const Candidate& candidate = candidates_[next_++];
+      own_pixels(map_, *models_[candidate.model_index], candidate, options_[candidate.model_index].tolerance,
+                 accepted_count_++, owner_);
+      accepted.push_back(candidate);
+    }
+    return accepted;
+  }
+
+  /// Per pixel: the running number of the accepted pose that explains it.
+  const std::vector<int>& owner() const { return owner_; }
+
+ private:
+  static bool better(const Candidate& a, const Candidate& b) { return a.score() > b.score(); }
+
+  /// Judges the first in line anew; sends it back to its place if it lost pixels to a better one.
+  bool stands_firm() {
+    Candidate& candidate = candidates_[next_];
+    const Model& model = *models_[candidate.model_index];
+    const VerifyOptions& options = options_[candidate.model_index];
     const float before = candidate.score();
     if (!candidate.has_variant) {
-      VariantChoice choice = choose_variant(map, model, candidate.T_view_model, options[candidate.model_index]);
+      VariantChoice choice = choose_variant(map_, model, candidate.T_view_model, options);
       candidate.has_variant = true;
       candidate.T_view_model = choice.T_view_model;
       candidate.confidence = choice.confidence;
       candidate.rivals = std::move(choice.rivals);
     }
-    candidate.evidence = verify(map, model, candidate.T_view_model, options[candidate.model_index], &owner);
-    if (candidate.score() < before) {
-      // Lost pixels to a better one: back into line.
-      const Candidate moved = candidate;
-      const auto place =
-          std::upper_bound(candidates.begin() + static_cast<std::ptrdiff_t>(next) + 1, candidates.end(), moved, better);
-      std::move(candidates.begin() + static_cast<std::ptrdiff_t>(next) + 1, place,
-                candidates.begin() + static_cast<std::ptrdiff_t>(next));
-      *(place - 1) = moved;
-      continue;
-    }
-    own_pixels(map, model, candidate, options[candidate.model_index].tolerance, static_cast<int>(accepted.size()),
-               owner);
-    accepted.push_back(candidate);
-    ++next;
+    candidate.evidence = verify(map_, model, candidate.T_view_model, options, &owner_);
+    if (candidate.score() >= before) return true;
+    const auto first = candidates_.begin() + static_cast<std::ptrdiff_t>(next_);
+    std::rotate(first, first + 1, std::upper_bound(first + 1, candidates_.end(), candidate, better));
+    return false;
   }
-  for (std::size_t i = 0; i < accepted.size(); ++i) {
-    accepted[i].occluded_by =
-        find_occluders(map, *models[accepted[i].model_index], accepted[i], static_cast<int>(i), owner);
+
+  const DepthMap& map_;
+  const std::span<const Model* const> models_;
+  const std::span<const VerifyOptions> options_;
+  const RunControl& control_;
+  std::vector<Candidate> candidates_;
+  std::size_t next_ = 0;
+  int accepted_count_ = 0;
+  std::vector<int> owner_;
+};
+
+}  // namespace
+
+Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
+             std::vector<Candidate> candidates, double min_score, int max_rejected, const RunControl& control) {
+  Line line(map, models, options, std::move(candidates), control);
+  Ranking ranking;
+  ranking.accepted = line.accept(min_score, std::numeric_limits<std::size_t>::max());
+  for (std::size_t i = 0; i < ranking.accepted.size(); ++i) {
+    Candidate& candidate = ranking.accepted[i];
+    candidate.occluded_by =
+        find_occluders(map, *models[candidate.model_index], candidate, static_cast<int>(i), line.owner());
   }
-  return accepted;
+  constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
+  ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(max_rejected));
+  return ranking;
 }
 
 }  // namespace binpose

@@ -26,18 +26,21 @@ struct Candidate {
   float score() const { return evidence.score() * confidence; }
 };
 
-/// The best candidates, best first, without doubles.
+/// Candidates without doubles, best first.
+struct Ranking {
+  std::vector<Candidate> accepted;  ///< those that score enough
+  std::vector<Candidate> rejected;  ///< the best of the others, without `occluded_by`
+};
+
+/// Ranks candidates. An accepted pose owns the pixels that it explains. The rest are judged anew without these, so that
+/// a second pose of the same part loses its evidence, whatever the part's symmetry. Deterministic: equal scores in the
+/// order of the list.
 ///
-/// An accepted pose owns the pixels that it explains. The rest are judged anew without these, so that a second pose of
-/// the same part loses its evidence, whatever the part's symmetry. Deterministic: equal scores in the order of the
-/// list.
-///
-/// @param options    final verification of each model's candidates, by model index.
+/// @param options       final verification of each model's candidates, by model index.
+/// @param min_score     candidates that score less, at first or for want of free pixels, are not accepted.
+/// @param max_rejected  of those, so many are ranked on among themselves; what is accepted does not depend on it.
 /// Ends early when the caller of `control` cancels; past a deadline what was found so far is still ranked.
-///
-/// @param min_score  candidates that score less, at first or for want of free pixels, are dropped.
-std::vector<Candidate> rank(const DepthMap& map, std::span<const Model* const> models,
-                            std::span<const VerifyOptions> options, std::vector<Candidate> candidates, double min_score,
-                            const RunControl& control = {});
+Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
+             std::vector<Candidate> candidates, double min_score, int max_rejected = 0, const RunControl& control = {});
 
 }  // namespace binpose

@@ -70,6 +70,7 @@ v1::DetectResponse one_part(const v1::DetectRequest& request) {
   part.mutable_pose()->mutable_orientation()->set_w(0.70710678118654757);
   part.set_score(0.875);
   part.set_visible_fraction(0.5);
+  part.set_confidence(1);
   response.mutable_stats()->set_total_seconds(0.0235);
   return response;
 }
@@ -156,10 +157,23 @@ TEST_F(Cli, DetectPrintsATableOfPosesInMillimetresAndDegrees) {
   server_.answer = one_part;
   const Output output = run("detect --model gear --unit mm --scene", {file("bin.pcd", "#")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
-  EXPECT_EQ(output.out, path("bin.pcd") +
-                            ": 1 found in 23.5 ms\n"
-                            "rank  model  x mm  y mm    z mm  roll deg  pitch deg  yaw deg  score  visible\n"
-                            "   1  gear   1.25  0.00  500.00       0.0        0.0     90.0  0.875     0.50\n");
+  EXPECT_EQ(output.out,
+            path("bin.pcd") +
+                ": 1 found in 23.5 ms\n"
+                "rank  model  x mm  y mm    z mm  roll deg  pitch deg  yaw deg  score  visible  confidence\n"
+                "   1  gear   1.25  0.00  500.00       0.0        0.0     90.0  0.875     0.50        1.00\n");
+}
+
+TEST_F(Cli, DetectSaysWhichPosesAreAmbiguous) {
+  server_.answer = [](const v1::DetectRequest& request) {
+    v1::DetectResponse response = one_part(request);
+    *response.add_hypotheses() = response.hypotheses(0);
+    response.mutable_hypotheses(1)->set_confidence(0.625);
+    *response.mutable_hypotheses(1)->add_variants() = response.hypotheses(0).pose();
+    return response;
+  };
+  EXPECT_THAT(run("detect --model gear --unit mm --scene", {file("bin.pcd", "#")}).out,
+              AllOf(HasSubstr("        0.63\n"), HasSubstr("warning: ambiguous: 2 may")));
 }
 
 TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
@@ -170,7 +184,7 @@ TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
 TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   const Output output =
       run("detect --model gear bolt --unit mm --max-results 5 --min-score 0 --start-point-share 0.5 "
-          "--normal-tolerance 15 --keep-support-plane --scene",
+          "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --scene",
           {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
   EXPECT_EQ(server_.stream_count(), 1);
@@ -182,10 +196,29 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   EXPECT_THAT(request.model_ids(), ::testing::ElementsAre("gear", "bolt"));
   EXPECT_EQ(request.params().max_results(), 5u);
   EXPECT_TRUE(request.params().has_min_score());
+  EXPECT_EQ(request.params().max_rejected(), 7u);
   EXPECT_EQ(request.params().start_point_share(), 0.5);
   EXPECT_EQ(request.params().normal_tolerance_degrees(), 15);
   EXPECT_TRUE(request.params().has_remove_support_plane());
   EXPECT_FALSE(request.params().remove_support_plane());
+}
+
+TEST_F(Cli, ViewDrawsTheResultOfOneDetection) {
+  if (run("detect --help").out.find("not in this build") != std::string::npos) GTEST_SKIP() << "built without viewer";
+  server_.answer = [](const v1::DetectRequest& request) {
+    v1::DetectResponse response = one_part(request);
+    *response.add_rejected() = response.hypotheses(0);
+    response.mutable_rejected(0)->set_score(0.125);
+    return response;
+  };
+  const std::string detect = "detect --model gear --unit mm --view " + path("page.html");
+  const Output output = run(detect + " --scene", {file("bin.pcd", "#")});
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  ASSERT_EQ(server_.detect_requests().size(), 1U);
+  EXPECT_GT(server_.detect_requests()[0].params().max_rejected(), 0U);
+  EXPECT_THAT(files_.read("page.html"), AllOf(HasSubstr("\"score\":0.875"), HasSubstr("\"score\":0.125")));
+  run(detect + " --max-rejected 0 --scene", {path("bin.pcd")});
+  EXPECT_EQ(server_.detect_requests().at(1).params().max_rejected(), 0U);
 }
 
 TEST_F(Cli, DetectAsJsonPrintsOneAnswerALineInTheOrderOfTheScenes) {
@@ -199,6 +232,21 @@ TEST_F(Cli, DetectAsJsonPrintsOneAnswerALineInTheOrderOfTheScenes) {
   EXPECT_EQ(answers[1].hypotheses(0).score(), 0.875);
   EXPECT_THAT(output.out,
               AllOf(HasSubstr("\"visibleFraction\":0.5"), HasSubstr("\"totalSeconds\":0.0235"), HasSubstr("\"y\":0,")));
+}
+
+TEST_F(Cli, ABatchShowsItsProgressOnATerminalWhenItsAnswersGoElsewhere) {
+  const std::string detect = "detect --model gear --unit mm --scene " + file("a.pcd", "#") + " " + file("b.pcd", "#");
+  const auto typed = [&](const std::string& arguments) {
+    const std::string command = "BINPOSE_SERVER=" + server_.address() + " script -qec '" BINPOSE_COMMAND " " +
+                                arguments + "' " + path("typed") + " >/dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
+    return files_.read("typed");
+  };
+  EXPECT_THAT(typed(detect + " >" + path("answers")),
+              AllOf(HasSubstr("] 50 % " + path("a.pcd")), HasSubstr("] 100 %")));
+  EXPECT_THAT(files_.read("answers"), AllOf(HasSubstr("b.pcd: nothing found"), Not(HasSubstr("%"))));
+  EXPECT_THAT(typed(detect), AllOf(HasSubstr("b.pcd: nothing found"), Not(HasSubstr("] 50 %")))) << "one or the other";
+  EXPECT_THAT(run(detect).err, IsEmpty());
 }
 
 TEST_F(Cli, AFailingSceneIsReportedAndTheOthersGoOn) {
@@ -251,8 +299,17 @@ TEST_F(Cli, ModelsListsShowsAndDeletes) {
   EXPECT_THAT(run("models --json").out, HasSubstr("\"id\":\"gear\""));
 }
 
+TEST_F(Cli, ExportSaysWhereTheModelIs) {
+  EXPECT_EQ(run("export gear", {path("gear.model")}).out, "exported gear to " + path("gear.model") + "\n");
+  EXPECT_EQ(files_.read("gear.model"), "a model");
+  EXPECT_EQ(run("export --json gear", {path("gear.model")}).out,
+            "{\"file\":\"" + path("gear.model") + "\",\"fileBytes\":7}\n");
+  EXPECT_EQ(run("export gear", {path("missing/gear.model")}).exit_code, 3);
+}
+
 TEST_F(Cli, EveryCommandTeachesByExamples) {
-  for (const char* command : {"train", "detect", "model", "watch", "bench", "request", "completion"}) {
+  for (const char* command : {"train", "detect", "models", "model", "delete", "export", "import", "watch", "bench",
+                              "health", "request", "completion"}) {
     EXPECT_THAT(run(std::string(command) + " --help").out, HasSubstr("Examples:\n  ")) << command;
   }
 }
@@ -334,19 +391,57 @@ TEST_F(Cli, WatchOfNoFolderExitsWith3) {
   EXPECT_EQ(run("watch --model gear --unit mm --dir", {path("missing")}).exit_code, 3);
 }
 
-TEST_F(Cli, TheShellCompletesCommandsOptionsWordsAndModels) {
-  const auto complete = [&](const std::string& words, int last) {
-    const std::string script = "PATH=$(dirname " BINPOSE_COMMAND "):$PATH BINPOSE_SERVER=" + server_.address() +
-                               " bash -c 'source <(binpose completion); COMP_WORDS=(" + words +
-                               "); COMP_CWORD=" + std::to_string(last) + "; _binpose; echo \"${COMPREPLY[@]}\"' >" +
-                               path("completed");
-    EXPECT_EQ(std::system(script.c_str()), 0);  // NOLINT(cert-env33-c)
+/// What the shell prints for a script, with the command in its path and the server in its environment.
+class Completion : public Cli {
+ protected:
+  std::string run_in(const std::string& shell, const std::string& script) {
+    const std::string command = "PATH=$(dirname " BINPOSE_COMMAND "):$PATH BINPOSE_SERVER=" + server_.address() +
+                                " TERM=dumb timeout 60 " + shell + " " + file("script", script) + " >" +
+                                path("completed") + " 2>&1";
+    EXPECT_EQ(std::system(command.c_str()), 0) << shell;  // NOLINT(cert-env33-c)
     return files_.read("completed");
+  }
+};
+
+TEST_F(Completion, OfBashKnowsCommandsOptionsWordsAndModels) {
+  const auto complete = [&](const std::string& words, int last) {
+    return run_in("bash", "source <(binpose completion); COMP_WORDS=(" + words +
+                              "); COMP_CWORD=" + std::to_string(last) + "; _binpose; echo \"${COMPREPLY[@]}\"");
   };
   EXPECT_EQ(complete("binpose det", 1), "detect\n");
   EXPECT_EQ(complete("binpose detect --min", 2), "--min-score\n");
   EXPECT_EQ(complete("binpose train --unit m", 3), "m mm\n");
   EXPECT_EQ(complete("binpose detect --model ge", 3), "gear\n");
+}
+
+TEST_F(Completion, OfFishKnowsThemTooAndDescribesThem) {
+  const auto complete = [&](const std::string& line) {
+    return run_in("fish --no-config", "binpose completion --shell fish | source; complete -C '" + line + "'");
+  };
+  EXPECT_THAT(complete("binpose det"), StartsWith("detect\tFind parts"));
+  EXPECT_THAT(complete("binpose detect --min"), StartsWith("--min-score\tLeave out"));
+  EXPECT_THAT(complete("binpose train --unit "), AllOf(HasSubstr("m\t"), HasSubstr("mm\t")));
+  EXPECT_THAT(complete("binpose detect --model ge"), StartsWith("gear\t"));
+  EXPECT_THAT(complete("binpose delete ge"), StartsWith("gear"));
+}
+
+TEST_F(Completion, OfZshIsTypedByTheTabulator) {
+  // A shell that believes itself at a terminal; each zpty -r waits for its pattern.
+  const auto complete = [&](const std::string& typed, const std::string& pattern) {
+    return run_in("zsh -f",
+                  "zmodload zsh/zpty && zpty shell zsh -fi\n"
+                  "zpty -w shell 'PS1=; autoload -U compinit && compinit -u -D &&"
+                  " source <(binpose completion --shell zsh); echo rea\\dy'\n"
+                  "zpty -r shell out '*ready*'\n"
+                  "zpty -w -n shell '" +
+                      typed +
+                      "'$'\\t'\n"
+                      "zpty -r shell out '*" +
+                      pattern + "*' && print done");
+  };
+  EXPECT_EQ(complete("binpose det", "detect"), "done\n");
+  EXPECT_EQ(complete("binpose detect --min", "--min-score"), "done\n");
+  EXPECT_EQ(complete("binpose detect --model ge", "gear"), "done\n");
 }
 
 TEST_F(Cli, ServerOnTheCommandLineOverridesTheEnvironment) {

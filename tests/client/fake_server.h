@@ -110,6 +110,14 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
     return call_status;
   }
 
+  grpc::Status ExportModel(grpc::ServerContext* /*context*/, const v1::ExportModelRequest* /*request*/,
+                           grpc::ServerWriter<v1::ExportModelResponse>* writer) override {
+    v1::ExportModelResponse part;
+    part.set_data("a model");
+    writer->Write(part);
+    return call_status;
+  }
+
   grpc::Status ListModels(grpc::ServerContext* /*context*/, const v1::ListModelsRequest* /*request*/,
                           v1::ListModelsResponse* models) override {
     models->add_models()->set_id("bolt");

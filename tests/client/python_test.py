@@ -65,6 +65,13 @@ class PythonTest(unittest.TestCase):
         self.assertAlmostEqual(np.linalg.det(rotation), 1)
         self.assertGreater(result.stats.total_seconds, 0)
 
+    def test_what_scored_too_little_stands_apart_and_every_part_says_how_sure_it_is(self):
+        params = binpose.v1.detection_service_pb2.DetectParams(min_score=0.6, max_rejected=4)
+        result = self.client.detect("part", scan(), params=params)
+        self.assertGreater(len(result.parts), 0)
+        self.assertTrue(all(part.score >= 0.6 and 0 < part.confidence <= 1 for part in result.parts))
+        self.assertTrue(1 <= len(result.rejected) <= 4 and all(part.score < 0.6 for part in result.rejected))
+
     def test_metres_in_floats_and_organised_points_tell_the_same_scene(self):
         best = self.client.detect("part", scan()).parts[0]
         metres = scan((depth * camera["depth_unit_mm"] / 1000).astype(np.float32), scale=1.0, unit="m")

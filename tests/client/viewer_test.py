@@ -1,6 +1,7 @@
 """The pages that `binpose detect --view` and `binpose model --view` write, opened in a browser and clicked through."""
 
 import json
+import math
 import re
 import shutil
 import sys
@@ -11,6 +12,9 @@ from pathlib import Path
 import browser
 from binpose_process import Server
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.actions.interaction import POINTER_TOUCH
+from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
@@ -18,6 +22,45 @@ DATA = Path(__file__).resolve().parents[1] / "data"
 PART = DATA / "parts/bearing_support.stl"
 SCENE = DATA / "scenes/bearing_support_01"
 NOT_BUILT = 77  # for ctest: skipped
+
+
+def write_box(path, x, y, z):
+    """STL of a box of three lengths, which four turns bring onto itself."""
+    corners = [[(x, y, z)[axis] * ((corner >> axis) & 1) for axis in range(3)] for corner in range(8)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    triangles = [t for a, b, c, d in faces for t in [(a, b, c), (a, c, d)]]
+    path.write_text("solid box\n" + "".join(
+        "facet normal 0 0 0\nouter loop\n" + "".join("vertex {} {} {}\n".format(*corners[i]) for i in triangle) +
+        "endloop\nendfacet\n" for triangle in triangles) + "endsolid box\n")
+
+
+def write_scene_four_times_as_dense(folder):
+    """The sample scene with each pixel of its depth image as four; returns how many were measured."""
+    import numpy as np
+    from PIL import Image
+    folder.mkdir()
+    depth = np.kron(np.asarray(Image.open(SCENE / "depth.png")), np.ones((2, 2), np.uint16)).astype(np.uint16)
+    Image.fromarray(depth).save(folder / "depth.png")
+    camera = json.loads((SCENE / "camera.json").read_text())
+    for name in ["width", "height", "fx", "fy"]:
+        camera[name] *= 2
+    for name in ["cx", "cy"]:
+        camera[name] = 2 * camera[name] + 0.5
+    (folder / "camera.json").write_text(json.dumps(camera))
+    return int((depth > 0).sum())
+
+
+def parts_of_a_page(path):
+    """The text of a page before, of, and after its data."""
+    return re.match(r'(.*<script type="application/json" id="data">)(.*?)(</script>.*)', path.read_text(), re.DOTALL).groups()
+
+
+def write_changed(page, source, change):
+    """Writes a page like `source`, whose data `change` has changed."""
+    head, text, tail = parts_of_a_page(source)
+    data = json.loads(text)
+    change(data)
+    page.write_text(head + json.dumps(data).replace("<", "\\u003c") + tail)
 
 
 class ViewerTest(unittest.TestCase):
@@ -75,6 +118,23 @@ class ViewerTest(unittest.TestCase):
         ActionChains(self.driver).move_to_element(self.find("canvas")[0]).click().perform()
         browser.draw(self.driver)
 
+    def touch(self, *path):
+        """A finger that comes down at the first of some points (pixels off the canvas's middle) and leaves at the last."""
+        finger = PointerInput(POINTER_TOUCH, "finger")
+        actions = ActionBuilder(self.driver, mouse=finger)
+        canvas = self.find("canvas")[0]
+        for i, (x, y) in enumerate(path):
+            actions.pointer_action.move_to(canvas, x, y)
+            if i == 0:
+                actions.pointer_action.pointer_down()
+        actions.pointer_action.pointer_up()
+        actions.perform()
+        browser.draw(self.driver)
+
+    def axes(self):
+        """Where the corner's three axes point."""
+        return [(line.get_attribute("x2"), line.get_attribute("y2")) for line in self.find("#axes line")]
+
     def selected(self):
         """Rank of the selected part, or None."""
         rows = self.find(".part[aria-current] .rank")
@@ -113,6 +173,41 @@ class ViewerTest(unittest.TestCase):
         self.assertIsNone(self.selected())
         self.click_canvas_centre()
         self.assertEqual(self.selected(), 1)
+
+    def test_a_tap_selects_and_one_finger_orbits(self):
+        self.open(self.page)
+        self.find(".part button")[0].click()  # puts it into the middle
+        browser.draw(self.driver)
+        self.press(Keys.ESCAPE)
+        before = self.axes()
+        self.touch((0, 0))
+        self.assertEqual(self.selected(), 1)
+        self.assertEqual(self.axes(), before)
+        self.touch((0, 0), (40, 10), (120, 30))
+        self.assertNotEqual(self.axes(), before)
+        self.assertEqual(self.selected(), 1, "a drag selects nothing else")
+
+    def test_an_ambiguous_pose_says_so_and_shows_its_variants(self):
+        def doubt(data):
+            best, second = data["answer"]["hypotheses"][:2]
+            best.update(confidence=0.625, variants=[second["pose"]])
+        page = self.folder / "ambiguous.html"
+        write_changed(page, self.page, doubt)
+        self.open(page)
+        rows = self.find(".part")
+        self.assertIn("ambiguous, 63 % sure", rows[0].text)
+        self.assertNotIn("sure", rows[1].text)
+        self.driver.find_element(By.CSS_SELECTOR, "[data-shows=truth]").click()
+        self.find(".part button")[0].click()
+        browser.draw(self.driver)
+        self.assertIn("as outlined (1)", self.text(".part[aria-current] dl"))
+        outlined = self.colours()
+        self.open(self.page)
+        self.driver.find_element(By.CSS_SELECTOR, "[data-shows=truth]").click()
+        self.find(".part button")[0].click()
+        browser.draw(self.driver)
+        self.assertIn("confidence", self.text(".part[aria-current] dl"))
+        self.assertNotEqual(self.colours(), outlined)
 
     def test_every_switch_changes_the_picture(self):
         self.open(self.page)
@@ -161,6 +256,16 @@ class ViewerTest(unittest.TestCase):
         self.assertEqual(self.find(".part"), [])
         self.assertEqual(self.text("#warnings"), answer["warnings"][0])
 
+    def test_opens_with_more_than_300_000_points(self):
+        scene, page = self.folder / "dense", self.folder / "dense.html"
+        count = write_scene_four_times_as_dense(scene)
+        self.assertGreater(count, 300_000)
+        self.server.binpose_json("detect", "--model", "part", "--scene", scene, "--unit", "mm", "--view", page)
+        self.open(page)
+        print(f"{count} points: drawn after {self.driver.execute_script('return performance.now()') / 1000:.1f} s")
+        self.assertIn(f"{count:,} points", self.text("#summary"))
+        self.assertGreater(self.colours()[0], 500)
+
     def test_names_are_text_and_never_markup(self):
         scene = self.folder / "<img src=x onerror=alert(1)> <!--<script>"
         shutil.copytree(SCENE, scene)
@@ -201,17 +306,27 @@ class ViewerTest(unittest.TestCase):
         self.assertNotEqual(self.colours(), before)
 
     def test_a_model_shows_its_axes_of_symmetry(self):
-        text = self.model_page.read_text()
-        half_turn_about_z = {"position": {"x": 0.074, "y": 0.043, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 1, "w": 0}}
-        symmetry = {"discrete": [half_turn_about_z], "axis": {"point": {}, "direction": {"x": 0, "y": 1, "z": 0}}}
-        page = self.folder / "symmetric.html"
-        page.write_text(re.sub(r'"symmetry":\{"discrete":\[.*?\](,"axis":[^,]*)?\}',
-                               lambda _: f'"symmetry":{json.dumps(symmetry)}', text, count=1))
+        write_box(self.folder / "box.stl", 80, 50, 30)
+        self.server.binpose_json("train", "--id", "box", "--mesh", self.folder / "box.stl", "--unit", "mm")
+        page = self.folder / "box.html"
+        self.server.binpose_json("model", "box", "--view", page)
         self.open(page)
-        self.assertIn("any turn, 180°", self.text("dl"))
+        self.assertEqual(self.text("[data-fact=symmetry]"), "2-fold x 3")
         before = self.colours()
         self.press("y")
         self.assertNotEqual(self.colours(), before)
+
+    def test_a_model_shows_an_axis_of_revolution_and_poses_nearly_alike(self):
+        def turn_about_z(degrees):
+            half = math.radians(degrees) / 2
+            return {"position": {}, "orientation": {"z": math.sin(half), "w": math.cos(half)}}
+        def change(data):
+            data["model"]["symmetry"]["axis"] = {"point": {}, "direction": {"x": 0, "y": 1, "z": 0}}
+            data["model"]["similarPoses"] = [turn_about_z(-90), turn_about_z(90)]
+        page = self.folder / "revolution.html"
+        write_changed(page, self.model_page, change)
+        self.open(page)
+        self.assertEqual(self.text("[data-fact=symmetry]"), "any turn; nearly, 90° 270°")
 
     def test_one_page_shows_one_scene(self):
         run = self.server.binpose("detect", "--model", "part", "--scene", SCENE, SCENE, "--unit", "mm", "--view", self.page)

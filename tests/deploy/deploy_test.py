@@ -1,10 +1,15 @@
 """What deploy/ configures, held to the server: its metrics, its options, and the tools that read these files."""
 
+import itertools
 import json
 import re
+import socket
 import subprocess
 import tempfile
+import time
 import unittest
+import urllib.error
+import urllib.parse
 import urllib.request
 from pathlib import Path
 
@@ -33,6 +38,18 @@ def dashboard_expressions():
 def alert_expressions():
     rules = yaml.safe_load((DEPLOY / "prometheus/alerts.yml").read_text())
     return [rule["expr"] for group in rules["groups"] for rule in group["rules"]]
+
+
+class Image:
+    """What the Dockerfile says of the server's image."""
+
+    def __init__(self, text):
+        self.entry = json.loads(re.findall(r"^ENTRYPOINT (.*)$", text, re.MULTILINE)[-1])
+        self.health = json.loads(re.search(r"^HEALTHCHECK .* CMD (.*)$", text, re.MULTILINE)[1])
+        self.environment = dict(re.findall(r"\b(BINPOSE_\w+)=(\S+)", text))
+
+
+IMAGE = Image((ROOT / "Dockerfile").read_text())
 
 
 class MetricsTest(unittest.TestCase):
@@ -111,6 +128,107 @@ class PrometheusTest(unittest.TestCase):
         self.assertEqual(check.returncode, 0, check.stdout + check.stderr)
 
 
+class GrafanaTest(unittest.TestCase):
+    def test_panels_lie_beside_each_other_in_24_columns(self):
+        taken = {}
+        for panel in DASHBOARD["panels"]:
+            place = panel["gridPos"]
+            self.assertLessEqual(place["x"] + place["w"], 24, panel["title"])
+            for cell in itertools.product(range(place["x"], place["x"] + place["w"]), range(place["y"], place["y"] + place["h"])):
+                self.assertNotIn(cell, taken, f"{panel['title']} lies on {taken.get(cell)}")
+                taken[cell] = panel["title"]
+
+    def test_panels_and_their_queries_have_names_of_their_own(self):
+        self.assertEqual(len({panel["id"] for panel in DASHBOARD["panels"]}), len(DASHBOARD["panels"]))
+        for panel in DASHBOARD["panels"]:
+            names = [target["refId"] for target in panel["targets"]]
+            self.assertEqual(len(set(names)), len(names), panel["title"])
+
+
+class Prometheus:
+    """Debian's, configured as deploy/ says but for where the server is and for its patience."""
+
+    def __init__(self, directory, target):
+        config = yaml.safe_load((DEPLOY / "prometheus/prometheus.yml").read_text())
+        config["global"] = {"scrape_interval": "1s", "evaluation_interval": "1s"}
+        config["rule_files"] = [str(DEPLOY / "prometheus" / file) for file in config["rule_files"]]
+        config["scrape_configs"][0]["static_configs"][0]["targets"] = [target]
+        (directory / "prometheus.yml").write_text(yaml.safe_dump(config))
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self._address = f"127.0.0.1:{free.getsockname()[1]}"
+        self._process = subprocess.Popen(
+            ["prometheus", f"--config.file={directory}/prometheus.yml", f"--storage.tsdb.path={directory}/metrics",
+             f"--web.listen-address={self._address}"], stderr=subprocess.DEVNULL)
+
+    def get(self, path, **parameters):
+        """The data of an answer; None while there is none."""
+        try:
+            url = f"http://{self._address}/api/v1/{path}?{urllib.parse.urlencode(parameters)}"
+            with urllib.request.urlopen(url, timeout=30) as answer:
+                return json.load(answer)["data"]
+        except urllib.error.URLError:
+            return None
+
+    def values(self, expression):
+        """Of each series its value now; none is the NaN of a mean over nothing."""
+        series = (self.get("query", query=expression) or {"result": []})["result"]
+        return [one["value"][1] for one in series if one["value"][1] != "NaN"]
+
+    def stop(self):
+        self._process.terminate()
+        self._process.wait(60)
+
+
+def wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.2)
+    return condition()
+
+
+class LivePrometheusTest(unittest.TestCase):
+    """What compose.yaml brings up, but for Grafana: a server, scraped by Prometheus."""
+
+    def setUp(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        models = Path(directory.name) / "models"
+        models.mkdir()
+        (models / "torn.model").write_bytes(b"torn")
+        self.server = Server(models)
+        self.addCleanup(self.server.stop)
+        self.prometheus = Prometheus(Path(directory.name), self.server.metrics)
+        self.addCleanup(self.prometheus.stop)
+
+    def call_in_every_way(self):
+        """A training, scans of which one is given up and one refused, and a look at the models."""
+        self.server.binpose_json("train", "--id", "part", "--mesh", PART, "--unit", "mm")
+        scan = ["detect", "--model", "part", "--scene", SCENE, "--unit", "mm"]
+        self.server.binpose_json(*scan)
+        self.server.binpose(*scan, "--timeout", "0.05")
+        self.server.binpose(*scan, "--min-score", "2")
+        self.server.binpose("models")
+
+    def test_every_panel_of_the_dashboard_shows_data(self):
+        self.assertTrue(wait_for(lambda: self.prometheus.values('up{job="binpose"} == 1')))
+        expressions = [e.replace("$__rate_interval", "5m").replace("$instance", ".+") for e in dashboard_expressions()]
+        end = time.monotonic() + 200
+        empty = expressions
+        while empty and time.monotonic() < end:
+            self.call_in_every_way()
+            empty = [e for e in empty if not self.prometheus.values(e)]
+        self.assertEqual(empty, [])
+
+    def test_the_alerts_are_evaluated_and_one_fires(self):
+        names = set(re.findall(r"alert: (\w+)", (DEPLOY / "prometheus/alerts.yml").read_text()))
+        rules = lambda: [rule for group in (self.prometheus.get("rules") or {"groups": []})["groups"]
+                         for rule in group["rules"] if rule["health"] == "ok"]
+        self.assertTrue(wait_for(lambda: {rule["name"] for rule in rules()} == names), rules())
+        firing = lambda: [alert["labels"]["alertname"] for alert in self.prometheus.get("alerts")["alerts"]
+                          if alert["state"] == "firing"]
+        self.assertTrue(wait_for(lambda: firing() == ["BinposeModelLost"]), firing())
+
+
 class ComposeTest(unittest.TestCase):
     def test_what_it_mounts_is_there_and_what_it_names_exists(self):
         compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
@@ -128,19 +246,26 @@ class ComposeTest(unittest.TestCase):
     def test_prometheus_scrapes_where_the_image_serves_metrics(self):
         [target] = yaml.safe_load((DEPLOY / "prometheus/prometheus.yml").read_text())["scrape_configs"][0]["static_configs"][0]["targets"]
         port = target.split(":")[1]
-        self.assertIn(f'"--metrics", "0.0.0.0:{port}"', (ROOT / "Dockerfile").read_text())
+        self.assertEqual(IMAGE.environment["BINPOSE_METRICS"], f"0.0.0.0:{port}")
 
     def test_the_image_starts_the_server_with_options_that_it_knows(self):
-        text = (ROOT / "Dockerfile").read_text()
-        entry = json.loads(re.findall(r"^ENTRYPOINT (.*)$", text, re.MULTILINE)[-1])
-        check = run(BIN / entry[0], *entry[1:], "--help")
-        self.assertEqual(check.returncode, 0, check.stderr)
-        health = json.loads(re.search(r"^HEALTHCHECK .* CMD (.*)$", text, re.MULTILINE)[1])
+        check = run(BIN / IMAGE.entry[0], *IMAGE.entry[1:], "--check-config", env=IMAGE.environment)
+        self.assertEqual((check.returncode, check.stderr), (0, ""))
+        shown = run(BIN / IMAGE.entry[0], "--print-config", env=IMAGE.environment).stdout
+        for name, value in IMAGE.environment.items():
+            option = name.removeprefix("BINPOSE_").lower().replace("_", "-")
+            self.assertRegex(shown, rf'(?m)^{option}="?{re.escape(value)}"?$')
+
+    def test_the_image_is_healthy_while_its_server_is_ready(self):
         with tempfile.TemporaryDirectory() as directory:
             server = Server(directory)
-            self.addCleanup(server.stop)
-            check = run(BIN / health[0], *health[1:], "--server", server.address)
-            self.assertEqual((check.returncode, check.stdout), (0, "serving\n"))
+            environment = {**IMAGE.environment, "BINPOSE_METRICS": f"0.0.0.0:{server.metrics.split(':')[1]}"}
+            healthy = run(BIN / IMAGE.health[0], *IMAGE.health[1:], env=environment)
+            server.stop()
+            ended = run(BIN / IMAGE.health[0], *IMAGE.health[1:], env=environment)
+        self.assertEqual((healthy.returncode, healthy.stderr), (0, ""))
+        self.assertEqual(ended.returncode, 1)
+        self.assertIn("Nothing answers", ended.stderr)
 
 
 class SystemdTest(unittest.TestCase):

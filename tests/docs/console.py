@@ -25,6 +25,16 @@ def steps_of(text):
     return steps
 
 
+def inline_steps_of(text):
+    """The commands of binpose's that stand within sentences and tables."""
+    return [Step(number, command, []) for number, line in enumerate(text.splitlines(), 1)
+            for command in re.findall(r"`(binpose(?:-server)? [^`]+)`", line)]
+
+
+def blocks_of(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
 def outline(line):
     """A line without its numbers, hashes and widths: what stays from run to run."""
     line = re.sub(r"\b[0-9a-f]{64}\b", "#", line)

@@ -20,12 +20,29 @@ def breaking(now, before):
     return subprocess.run([BUF, "breaking", now, "--against", before], cwd=ROOT, capture_output=True, text=True).stdout
 
 
+def git(repository, *arguments):
+    return subprocess.run(["git", "-C", repository, *arguments], capture_output=True, check=False)
+
+
+def proto_of_last_tag(repository, folder):
+    """Unpacks proto/ as it was at the last tag before HEAD; None if there is no tag."""
+    tag = git(repository, "describe", "--tags", "--abbrev=0")
+    if tag.returncode != 0:
+        return None
+    archive = git(repository, "archive", "--format=tar", tag.stdout.decode().strip(), "proto")
+    subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
+    return Path(folder) / "proto"
+
+
 class BreakingTest(unittest.TestCase):
-    def changed(self, pattern, replacement):
-        """A copy of proto/ with one change in its model service."""
+    def folder(self):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)
-        copy = Path(directory.name) / "proto"
+        return Path(directory.name)
+
+    def changed(self, pattern, replacement):
+        """A copy of proto/ with one change in its model service."""
+        copy = self.folder() / "proto"
         shutil.copytree(ROOT / "proto", copy)
         file = copy / "binpose/v1/model_service.proto"
         text, count = re.subn(pattern, replacement, file.read_text(), count=1)
@@ -34,10 +51,26 @@ class BreakingTest(unittest.TestCase):
         return copy
 
     def test_nothing_breaks_since_the_last_tag(self):
-        last = subprocess.run(["git", "describe", "--tags", "--abbrev=0"], cwd=ROOT, capture_output=True, text=True)
-        if last.returncode != 0:
+        before = proto_of_last_tag(ROOT, self.folder())
+        if before is None:
             self.skipTest("no tag yet: nothing was promised")
-        self.assertEqual(breaking("proto", f".git#tag={last.stdout.strip()},subdir=proto"), "")
+        self.assertEqual(breaking("proto", before), "")
+
+    def test_what_counts_is_the_last_tag_not_the_last_commit(self):
+        repository = self.folder()
+        shutil.copytree(ROOT / "proto", repository / "proto")
+        git(repository, "init", "--quiet")
+        self.assertIsNone(proto_of_last_tag(repository, self.folder()))
+        identity = ["-c", "user.name=test", "-c", "user.email=test@localhost"]
+        git(repository, "add", "proto")
+        git(repository, *identity, "commit", "--quiet", "--message", "first")
+        git(repository, *identity, "tag", "--annotate", "v1", "--message", "first")
+        shutil.rmtree(repository / "proto")
+        shutil.copytree(self.changed(r"  double diameter = 2;\n", ""), repository / "proto")
+        git(repository, *identity, "commit", "--all", "--quiet", "--message", "second")
+        before = proto_of_last_tag(repository, self.folder())
+        self.assertIn("diameter", breaking(repository / "proto", before))
+        self.assertEqual(breaking("proto", before), "")
 
     def test_a_field_that_goes_or_changes_is_noticed(self):
         self.assertIn("diameter", breaking(self.changed(r"  double diameter = 2;\n", ""), "proto"))

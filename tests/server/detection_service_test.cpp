@@ -61,6 +61,20 @@ TEST_F(DetectionServiceTest, FindsThePartAndAnswersInTheUnitOfTheCloud) {
   EXPECT_NE(answers[0].stats().stop_reason(), v1::STOP_REASON_UNSPECIFIED);
 }
 
+TEST_F(DetectionServiceTest, AnswersWhatScoredTooLittleOnlyWhenAskedAndApart) {
+  v1::DetectRequest request = detect_request("strict", "block");
+  request.mutable_params()->set_min_score(1);
+  v1::DetectRequest curious = request;
+  curious.mutable_params()->set_max_rejected(3);
+  const auto answers = server().detect({request, curious});
+  ASSERT_EQ(answers.size(), 2);
+  EXPECT_EQ(answers[0].rejected_size(), 0);
+  EXPECT_EQ(answers[1].hypotheses_size(), 0);
+  ASSERT_GE(answers[1].rejected_size(), 1);
+  EXPECT_LE(answers[1].rejected_size(), 3);
+  EXPECT_NEAR(answers[1].rejected(0).pose().position().z(), 400, 2);
+}
+
 TEST_F(DetectionServiceTest, SearchesForSeveralModelsInOneRequest) {
   ASSERT_TRUE(server().train(train_request("twin")).ok());
   v1::DetectRequest request = detect_request("both", "block");
@@ -290,6 +304,10 @@ INSTANTIATE_TEST_SUITE_P(
                  [](v1::DetectRequest& r) { r.mutable_params()->set_max_results(0); },
                  kInvalid,
                  {"max_results is 0", "1000]"}},
+        BadFrame{"MaxRejected",
+                 [](v1::DetectRequest& r) { r.mutable_params()->set_max_rejected(1001); },
+                 kInvalid,
+                 {"max_rejected is 1001", "1000]"}},
         BadFrame{"StartPointShare",
                  [](v1::DetectRequest& r) { r.mutable_params()->set_start_point_share(kNaN); },
                  kInvalid,

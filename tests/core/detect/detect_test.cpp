@@ -171,6 +171,27 @@ TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
   for (const PoseHypothesis& h : result.hypotheses) EXPECT_GE(h.score, 0.6);
 }
 
+TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
+  const Model model = testing::quick_model(testing::l_block());
+  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const DetectResult all = *search(cloud, model);
+  ASSERT_GE(all.hypotheses.size(), 2U);
+  DetectParams params;
+  params.min_score = (all.hypotheses.front().score + all.hypotheses.back().score) / 2;
+  const DetectResult plain = *search(cloud, model, params);
+  params.max_rejected = 2;
+  const DetectResult result = *search(cloud, model, params);
+  EXPECT_TRUE(plain.rejected.empty());
+  ASSERT_FALSE(result.rejected.empty());
+  EXPECT_LE(result.rejected.size(), 2U);
+  for (const PoseHypothesis& h : result.rejected) EXPECT_LT(h.score, params.min_score);
+  ASSERT_EQ(result.hypotheses.size(), plain.hypotheses.size());
+  for (std::size_t i = 0; i < plain.hypotheses.size(); ++i) {
+    EXPECT_EQ(result.hypotheses[i].score, plain.hypotheses[i].score);
+    EXPECT_EQ(result.hypotheses[i].occluded_by, plain.hypotheses[i].occluded_by);
+  }
+}
+
 TEST(Detect, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
   const Model model = testing::quick_model(testing::l_block());
   const PointCloud cloud = testing::render(four_blocks(), sensor());

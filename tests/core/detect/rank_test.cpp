@@ -31,9 +31,12 @@ struct Scene {
     c.evidence = verify(map, model, c.T_view_model, options[0]);
     return c;
   }
-  std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
+  Ranking rank_all(std::vector<Candidate> candidates, double min_score, int max_rejected) const {
     const Model* models[] = {&model};
-    return rank(map, models, options, std::move(candidates), min_score);
+    return rank(map, models, options, std::move(candidates), min_score, max_rejected);
+  }
+  std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
+    return rank_all(std::move(candidates), min_score, 0).accepted;
   }
   bool is_at(const Candidate& c, const Pose& pose) const {
     const Eigen::Vector3f centre = model.centre.cast<float>();
@@ -83,6 +86,20 @@ TEST(Rank, DropsWhatScoresTooLittle) {
   EXPECT_EQ(scene.ranked({bad, good}, 0.3).size(), 1u);
   EXPECT_TRUE(scene.ranked({bad}, 0.3).empty());
   EXPECT_TRUE(scene.ranked({}, 0.3).empty());
+}
+
+TEST(Rank, KeepsApartTheBestOfThoseThatScoreTooLittle) {
+  const Scene scene = blocks();
+  const Candidate good = scene.candidate(scene.poses[0]), fair = scene.candidate(shifted(scene.poses[1], 0.0015));
+  const Candidate hopeless = scene.candidate(shifted(scene.poses[1], 0.03));
+  const double min_score = (good.score() + fair.score()) / 2;
+  const Ranking ranking = scene.rank_all({hopeless, fair, good, fair}, min_score, 5);
+  ASSERT_EQ(ranking.accepted.size(), 1u);
+  ASSERT_GE(ranking.rejected.size(), 1u);
+  EXPECT_EQ(ranking.rejected[0].score(), fair.score());
+  for (const Candidate& rejected : ranking.rejected) EXPECT_GT(rejected.score(), 0);
+  EXPECT_EQ(scene.rank_all({fair, good, fair}, min_score, 1).rejected.size(), 1u);
+  EXPECT_TRUE(scene.rank_all({fair, good, fair}, min_score, 0).rejected.empty());
 }
 
 TEST(Rank, OfEqualScoresKeepsTheOrderOfTheList) {

@@ -18,12 +18,14 @@ class Part:
     residual: float
     votes: float
     occluded_by: tuple  # indices into Result.parts: take those first
+    confidence: float  # that this pose is right, not one of `variants`
+    variants: tuple = field(repr=False)  # 4 x 4 each: nearly alike poses that the scan does not rule out
 
     @classmethod
     def of(cls, hypothesis):
         return cls(hypothesis.model_id, matrix_of(hypothesis.pose), hypothesis.score, hypothesis.visible_fraction,
                    hypothesis.explained_fraction, hypothesis.violated_fraction, hypothesis.residual, hypothesis.votes,
-                   tuple(hypothesis.occluded_by))
+                   tuple(hypothesis.occluded_by), hypothesis.confidence, tuple(map(matrix_of, hypothesis.variants)))
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,12 @@ class Result:
     warnings: tuple
     stats: object = field(repr=False)  # binpose.v1.DetectStats
     request_id: str = ""
+    rejected: tuple = field(default=(), repr=False)  # below min_score, where DetectParams.max_rejected asked for them
 
     @classmethod
     def of(cls, answer):
-        return cls(tuple(map(Part.of, answer.hypotheses)), tuple(answer.warnings), answer.stats, answer.request_id)
+        return cls(tuple(map(Part.of, answer.hypotheses)), tuple(answer.warnings), answer.stats, answer.request_id,
+                   tuple(map(Part.of, answer.rejected)))
 
 
 def matrix_of(pose):
