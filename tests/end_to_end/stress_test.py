@@ -80,49 +80,50 @@ class StressTest(unittest.TestCase):
 class OverloadTest(StressTest):
     arguments = ["--queue", "2"]
 
-    def capacity(self):
-        """Answers a second when two callers keep the server just busy."""
-        seconds = 10 if FULL else 4
+    def ask(self, callers, seconds, pause):
+        """Answers, and refusals with the seconds that each took, of callers that ask again and again."""
         end = time.monotonic() + seconds
-        counts = []
+        good, refused = [], []
 
-        def ask(_):
-            api = Api(self.server.address)
-            while time.monotonic() < end:
-                answer(api, self.request)
-                counts.append(1)
-
-        with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            list(pool.map(ask, range(2)))
-        return len(counts) / seconds
-
-    def test_overload_keeps_goodput_and_refuses_at_once(self):
-        capacity = self.capacity()
-        seconds = 60 if FULL else 8
-        end = time.monotonic() + seconds
-        good, refused, hints = [], [], []
-
-        def press(_):
+        def ask_on(_):
             api = Api(self.server.address)
             while time.monotonic() < end:
                 response, took = answer(api, self.request)
                 if response.hypotheses:
                     good.append(took)
                 else:
+                    self.assertTrue(response.error.HasField("retry_delay"), response.error)
                     refused.append(took)
-                    hints.append(response.error.HasField("retry_delay"))
-                    time.sleep(1 / capacity)  # clients that heed the hint ask about as often as the server answers
+                    time.sleep(pause)
 
-        with concurrent.futures.ThreadPoolExecutor(8) as pool:
-            list(pool.map(press, range(8)))
-        offered = (len(good) + len(refused)) / seconds / capacity
-        goodput = len(good) / seconds / capacity
+        with concurrent.futures.ThreadPoolExecutor(callers) as pool:
+            list(pool.map(ask_on, range(callers)))
+        return good, refused
+
+    def test_overload_keeps_goodput_and_refuses_at_once(self):
+        # In turn, so that both see the same machine: three callers fill the thread and the queue, and none is refused;
+        # of eight most are.
+        rounds, calm_seconds, seconds = (12, 5, 5) if FULL else (2, 3, 4)
+        calm, good, refused = [], [], []
+        self.assert_serves()
+        for round_ in range(rounds):
+            calm += self.ask(3, calm_seconds, 0)[0]
+            capacity = len(calm) / calm_seconds / (round_ + 1)
+            # Clients that heed the hint ask about as often as the server answers.
+            answers, refusals = self.ask(8, seconds, 1 / max(1, capacity))
+            good += answers
+            refused += refusals
+        capacity = len(calm) / (rounds * calm_seconds)
+        offered = (len(good) + len(refused)) / (rounds * seconds) / capacity
+        goodput = len(good) / (rounds * seconds) / capacity
         start = time.monotonic()
         self.assert_serves()
-        figure("overload", f"offered {offered:.1f} x capacity, goodput {100 * goodput:.0f} %, "
-               f"refusals p99 {1000 * percentile(refused, 0.99):.0f} ms, recovered in {time.monotonic() - start:.2f} s")
-        self.assertGreater(goodput, 0.75)
-        self.assertTrue(all(hints) and hints)
+        recovery = time.monotonic() - start
+        figure("overload", f"{capacity:.1f} answers a second at most; offered {offered:.1f} x that, goodput "
+               f"{100 * goodput:.0f} %, refusals p50 {1000 * percentile(refused, 0.5):.0f} p99 "
+               f"{1000 * percentile(refused, 0.99):.0f} ms, recovered in {recovery:.2f} s")
+        self.assertGreater(goodput, 0.9 if FULL else 0.75)
+        self.assertLess(recovery, 2 if FULL else 10)
 
 
 class TrainingBesideTest(StressTest):
@@ -148,7 +149,7 @@ class TrainingBesideTest(StressTest):
         ratio = percentile(beside, 0.99) / percentile(alone, 0.99)
         figure("training beside", f"p99 {1000 * percentile(alone, 0.99):.0f} ms alone, "
                f"{1000 * percentile(beside, 0.99):.0f} ms beside a training loop, ratio {ratio:.2f}")
-        self.assertTrue(beside)
+        self.assertLess(ratio, 1.5 if FULL else 3)
 
 
 class ReplaceTest(StressTest):
@@ -193,6 +194,7 @@ class CancelTest(StressTest):
         computed = metric(self.server, 'binpose_cancel_duration_seconds_count{place="compute"}')
         figure("cancel", f"{count} cancels, {seen:.0f} caught at work, of {computed:.0f} in compute {within:.0f} "
                "ended within 10 ms")
+        self.assertGreater(within, 0.7 * computed)
         self.assertEqual(metric(self.server, "binpose_detect_streams"), 0)
         self.assertEqual(metric(self.server, "binpose_requests_held_bytes"), 0)
 
@@ -226,6 +228,36 @@ class KillTest(StressTest):
             acknowledged = served
         figure("kill", f"{count} kills while importing, replacing and deleting: every acknowledged model was there, "
                "none half-written")
+
+
+class KillTrainingTest(StressTest):
+    def test_a_kill_while_training_leaves_the_old_model(self):
+        dice = random.Random(3)
+        count = 30 if FULL else 3
+        old = self.api.models()[0].content_hash
+        seconds = 3
+        for round_ in range(count):
+            timer = threading.Timer(dice.uniform(0, seconds), self.server.kill)
+            timer.start()
+            start = time.monotonic()
+            trained = 0
+            try:
+                while True:
+                    for message in self.api.train("part"):
+                        pass
+                    trained += 1
+            except grpc.RpcError:
+                pass
+            timer.join()
+            seconds = max(seconds, min(10, time.monotonic() - start))
+            self.server = self.start()
+            self.api = Api(self.server.address)
+            # Trained from equal bytes, the new model equals the old one; its generation counts the acknowledged ones.
+            self.assertEqual([entry.content_hash for entry in self.api.models()], [old], f"round {round_}")
+            self.assertGreaterEqual(self.api.models()[0].generation, trained)
+            self.assertEqual(metric(self.server, "binpose_model_files_skipped_total"), 0)
+        self.assert_serves()
+        figure("kill training", f"{count} kills while training the same model again and again: it is served and verifies")
 
 
 class DiskFullTest(unittest.TestCase):
@@ -274,6 +306,7 @@ class MemoryTest(StressTest):
         growth = (max(most) - before) / 2**20
         figure("huge message", f"400 MiB at a limit of 64 MiB: RSS grew by {growth:.0f} MiB; {caught.exception.code().name}"
                f" {caught.exception.details()!r}")
+        self.assertLess(growth, 64 + 2 * 64 + 100)  # the quota: what is held and two messages on their way
         self.api = Api(self.server.address)
         self.assert_serves()
 
@@ -329,6 +362,24 @@ class DeadPeerTest(StressTest):
             peer.stdout.close()
 
 
+class SlowReaderTest(StressTest):
+    arguments = ["--write-timeout", "2", "--log-level", "error"]
+
+    def test_a_reader_that_answers_pings_but_takes_nothing_is_cut_off(self):
+        name = "x" * 256  # answers that fill what the connection takes on its own
+        frames = (wire.detection.DetectRequest(request_id=name) for _ in range(1_000_000))
+        start = time.monotonic()
+        call = self.api.detect(frames)  # nobody reads it
+        deadline = start + 120
+        while metric(self.server, "binpose_detect_streams") == 0 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        while metric(self.server, "binpose_detect_streams") > 0 and time.monotonic() < deadline:
+            time.sleep(0.1)
+        figure("slow reader", f"cut off after {time.monotonic() - start:.1f} s at a write timeout of 2 s")
+        self.assertEqual(metric(self.server, "binpose_detect_streams"), 0)
+        call.cancel()
+
+
 class OperationsTest(StressTest):
     def test_metrics_are_clean(self):
         self.assert_serves()
@@ -357,30 +408,17 @@ class OperationsTest(StressTest):
 class CostTest(StressTest):
     def test_what_the_service_adds_to_a_detection(self):
         width, height = 640, 470  # 300 800 points, most of them a wall: what core does with them is not measured
-        points = bytearray()
-        for row in range(height):
-            for column in range(width):
-                points += struct.pack("<3f", column - 320, row - 235, 1000)
-        request = wire.detection.DetectRequest(
-            model_ids=["part"],
-            cloud=wire.types.PointCloud(unit=wire.types.LENGTH_UNIT_MILLIMETRE, points=wire.types.PackedPoints(
-                width=width, height=height, xyz=bytes(points)))).SerializeToString()
-        costs = []
-        sent = []
-
-        def requests():
-            for _ in range(31):
-                sent.append(time.monotonic())
-                yield request
-                ready.acquire()
-
-        ready = threading.Semaphore(0)
-        for response in self.api.detect_bytes(requests()):
-            self.assertFalse(response.HasField("error"), response.error)
-            costs.append(time.monotonic() - sent[-1] - response.stats.total_seconds)
-            ready.release()
-        figure("cost", f"median {1000 * percentile(costs[1:], 0.5):.1f} ms a frame of 300 800 points outside core, "
-               "Python's share of the transport included")
+        scene = self.directory / "wall.pcd"
+        head = (f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {width}\nHEIGHT {height}\n"
+                f"POINTS {width * height}\nDATA binary\n").encode()
+        scene.write_bytes(head + b"".join(struct.pack("<3f", column - 320, row - 235, 1000)
+                                          for row in range(height) for column in range(width)))
+        [report] = self.server.binpose_json("bench", "--model", "part", "--scene", scene, "--unit", "mm", "--rate", "2",
+                                            "--duration", "30" if FULL else "5")
+        cost = report["overheadSeconds"]
+        figure("cost", f"a frame of 300 800 points costs {1000 * cost['p50']:.1f} ms (median) outside core, from the "
+               f"client's write to its answer over loopback; p95 {1000 * cost['p95']:.1f} ms")
+        self.assertLess(cost["p50"], 0.05)
 
 
 @unittest.skipUnless(BUF.exists(), "buf is not installed")
@@ -406,9 +444,9 @@ class ForeignClientTest(StressTest):
 
 
 class SoakTest(StressTest):
-    @unittest.skipUnless(FULL, "nightly")
+    @unittest.skipUnless(FULL, "takes minutes")
     def test_memory_does_not_grow(self):
-        minutes = float(os.environ.get("BINPOSE_SOAK_MINUTES", "30"))
+        minutes = float(os.environ.get("BINPOSE_SOAK_MINUTES", "3"))
         samples = []
         start = time.monotonic()
         while (elapsed := time.monotonic() - start) < 60 * minutes:
@@ -418,8 +456,10 @@ class SoakTest(StressTest):
         mean_x = sum(x for x, _ in samples) / len(samples)
         mean_y = sum(y for _, y in samples) / len(samples)
         slope = sum((x - mean_x) * (y - mean_y) for x, y in samples) / sum((x - mean_x) ** 2 for x, _ in samples)
-        figure("soak", f"{minutes:.0f} minutes, RSS {mean_y:.0f} MiB, slope {slope:.2f} MiB/h")
-        self.assertLess(slope, 1)
+        figure("soak", f"{minutes:.0f} minutes, {len(samples)} detections after warm-up, RSS {samples[0][1]:.1f} MiB then "
+               f"{samples[-1][1]:.1f} MiB, slope {slope:.2f} MiB/h")
+        if minutes >= 30:  # a shorter one cannot tell 1 MiB/h from noise
+            self.assertLess(slope, 1)
 
 
 if __name__ == "__main__":
