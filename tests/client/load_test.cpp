@@ -14,14 +14,14 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::Pair;
 
-/// Four scans in a fifth of a second.
+/// Four scans in a second, so that even a busy machine sends the last in time.
 LoadPlan small_plan() {
   LoadPlan plan;
   plan.requests.resize(2);
   plan.requests[0].set_request_id("a");
   plan.requests[1].set_request_id("b");
-  plan.rate = 20;
-  plan.duration = 0.2;
+  plan.rate = 4;
+  plan.duration = 1;
   return plan;
 }
 
