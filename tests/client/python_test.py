@@ -136,7 +136,7 @@ class ExampleTest(unittest.TestCase):
         return subprocess.run(
             [sys.executable, PACKAGE / "examples/depth_to_robot.py", "--server", server.address, "--model", "part", "--scene",
              scene, "--cell", PACKAGE / "examples/cell.json"],
-            env={**os.environ, "PYTHONPATH": str(built)}, capture_output=True, text=True, timeout=60)
+            env={**os.environ, "PYTHONPATH": str(built)}, capture_output=True, text=True, timeout=300)
 
     def test_the_target_is_where_a_true_part_is_taken_hold_of(self):
         run = self.run_example(SCENE)

@@ -61,7 +61,7 @@ class MetricsTest(unittest.TestCase):
             server = Server(Path(directory) / "models")
             server.binpose_json("train", "--id", "part", "--mesh", PART, "--unit", "mm")
             server.binpose_json("detect", "--model", "part", "--scene", SCENE, "--unit", "mm")
-            with urllib.request.urlopen(f"http://{server.metrics}/metrics", timeout=30) as page:
+            with urllib.request.urlopen(f"http://{server.metrics}/metrics", timeout=120) as page:
                 cls.page = page.read().decode()
             server.stop()
         cls.series = {}  # metric -> label -> values
@@ -164,7 +164,7 @@ class Prometheus:
         """The data of an answer; None while there is none."""
         try:
             url = f"http://{self._address}/api/v1/{path}?{urllib.parse.urlencode(parameters)}"
-            with urllib.request.urlopen(url, timeout=30) as answer:
+            with urllib.request.urlopen(url, timeout=120) as answer:
                 return json.load(answer)["data"]
         except urllib.error.URLError:
             return None

@@ -23,7 +23,7 @@ class Server:
     def stop(self):
         """Ends it as systemd or Docker would; returns the exit status."""
         self._process.send_signal(signal.SIGTERM)
-        status = self._process.wait(timeout=60)
+        status = self._process.wait(timeout=300)
         self._process.stdout.close()
         return status
 
@@ -48,7 +48,7 @@ class Server:
     def binpose(self, *arguments):
         """Runs the client; returns the finished process with its output as text."""
         return subprocess.run([BIN / "binpose", *arguments, "--server", self.address], capture_output=True, text=True,
-                              timeout=120)
+                              timeout=300)
 
     def binpose_json(self, *arguments):
         """The objects that `binpose ... --json` prints, one a line; the command must succeed."""

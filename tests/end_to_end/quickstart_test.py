@@ -88,7 +88,7 @@ class QuickstartTest(unittest.TestCase):
         self.assertEqual(request["cloud"]["unit"], "LENGTH_UNIT_MILLIMETRE")
 
     def test_calls_are_counted(self):
-        with urllib.request.urlopen(f"http://{self.server.metrics}/metrics", timeout=30) as page:
+        with urllib.request.urlopen(f"http://{self.server.metrics}/metrics", timeout=120) as page:
             self.assertIn("Train", page.read().decode())
 
 

@@ -50,21 +50,21 @@ class Api:
 
     def models(self):
         return self._method("unary_unary", "ModelService/ListModels", model.ListModelsRequest,
-                            model.ListModelsResponse)(model.ListModelsRequest(), timeout=30).models
+                            model.ListModelsResponse)(model.ListModelsRequest(), timeout=120).models
 
     def delete(self, model_id):
         return self._method("unary_unary", "ModelService/DeleteModel", model.DeleteModelRequest,
-                            model.DeleteModelResponse)(model.DeleteModelRequest(id=model_id), timeout=30)
+                            model.DeleteModelResponse)(model.DeleteModelRequest(id=model_id), timeout=120)
 
     def export_model(self, model_id):
         parts = self._method("unary_stream", "ModelService/ExportModel", model.ExportModelRequest,
-                             model.ExportModelResponse)(model.ExportModelRequest(id=model_id), timeout=30)
+                             model.ExportModelResponse)(model.ExportModelRequest(id=model_id), timeout=120)
         return b"".join(part.data for part in parts)
 
     def import_model(self, model_id, data):
         return self._method("stream_unary", "ModelService/ImportModel", model.ImportModelRequest,
                             model.ImportModelResponse)(
-            iter([model.ImportModelRequest(id=model_id, data=data)]), timeout=30).model
+            iter([model.ImportModelRequest(id=model_id, data=data)]), timeout=120).model
 
 
 def scan_request(binpose, request_id="", model_id="part"):

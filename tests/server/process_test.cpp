@@ -29,7 +29,7 @@ class ServerProcess {
     if (child_ == 0) {
       ::dup2(pipe[1], STDOUT_FILENO);
       ::execl(BINPOSE_SERVER, BINPOSE_SERVER, "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0", "--model-dir",
-              model_dir.c_str(), nullptr);
+              model_dir.c_str(), "--drain-timeout", "300", nullptr);  // trainings are slow where others are busy
       ::_exit(127);
     }
     ::close(pipe[1]);
