@@ -144,7 +144,7 @@ bool search_for_wrong_parts(const BinScene& scene, const Trained& trained, const
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) {  // NOLINT(readability-function-size): one line an option
   CLI::App app("Searches whole scenes and compares with the truth.");
   std::string parts_folder, scenes_folder, filter, only;
   bool wrong_parts = false;

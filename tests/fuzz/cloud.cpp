@@ -6,7 +6,7 @@
 #include "server/convert_cloud.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace binpose;
+  using namespace binpose;  // NOLINT
   v1::PointCloud message;
   message.set_unit(v1::LENGTH_UNIT_MILLIMETRE);
   message.set_pcd(data, size);

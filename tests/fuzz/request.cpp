@@ -12,7 +12,7 @@
 #include "server/frame_bytes.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace binpose;
+  using namespace binpose;  // NOLINT
   const grpc::Slice slice(data, size);
   grpc::ByteBuffer bytes(&slice, 1);
   if (server::request_id_of(bytes).size() > server::kMaxRequestIdBytes) std::abort();
