@@ -223,6 +223,7 @@ class ClusterGrid {
 
 /// The strongest clusters, without those that repeat a stronger one or have too many of them around.
 std::vector<PoseCluster> thin_out(const std::vector<PoseCluster>& clusters, const ClusterOptions& options) {
+  const float half_angle_cosine = std::cos(0.5F * options.angle);
   std::vector<PoseCluster> kept;
   ClusterGrid grid(options.neighbourhood);
   for (const PoseCluster& candidate : clusters) {
@@ -233,7 +234,7 @@ std::vector<PoseCluster> thin_out(const std::vector<PoseCluster>& clusters, cons
       const PoseCluster& other = kept[i];
       if ((other.centre - candidate.centre).squaredNorm() > options.neighbourhood * options.neighbourhood) continue;
       ++around;
-      repeats = repeats || same_pose(other, candidate, options.radius, std::cos(0.5F * options.angle));
+      repeats = repeats || same_pose(other, candidate, options.radius, half_angle_cosine);
       if (repeats || around >= options.most_per_neighbourhood) break;
     }
     if (repeats || around >= options.most_per_neighbourhood) continue;

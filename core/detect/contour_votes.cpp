@@ -18,8 +18,7 @@ struct ContourGrid {
   std::vector<ContourPoint> points;
   std::vector<int> block;  ///< of each point
   std::vector<int> first;  ///< per block: the first point in it or after it
-  std::vector<float> px, py, pz, nx, ny,
-      nz;  ///< positions and normals by component, with room to read lanes past the end
+  PointColumns positions, normals;
 
   explicit ContourGrid(const DepthMap& map) : columns(map.width / kBlock + 1), rows(map.height / kBlock + 1) {
     std::vector<int> contour_of(static_cast<std::size_t>(columns) * rows, -1);
@@ -35,7 +34,8 @@ struct ContourGrid {
       if (contour_of[i] >= 0) add(map.contours[contour_of[i]], static_cast<int>(i));
     }
     first.push_back(static_cast<int>(points.size()));
-    for (std::vector<float>* component : {&px, &py, &pz, &nx, &ny, &nz}) component->resize(points.size() + kLanes);
+    positions.pad();
+    normals.pad();
   }
 
  private:
@@ -45,12 +45,8 @@ struct ContourGrid {
     contour.outward = in_plane(contour).normalized();
     points.push_back(contour);
     block.push_back(at);
-    px.push_back(contour.position.x());
-    py.push_back(contour.position.y());
-    pz.push_back(contour.position.z());
-    nx.push_back(contour.normal.x());
-    ny.push_back(contour.normal.y());
-    nz.push_back(contour.normal.z());
+    positions.add(contour.position);
+    normals.add(contour.normal);
   }
 };
 
@@ -66,15 +62,12 @@ void find_partners(const ContourGrid& grid, int a, int first, int last, const Pa
                    std::vector<int>& found) {
   const Eigen::Vector3f &p = grid.points[a].position, &n = grid.points[a].normal;
   for (int b = first; b < last; b += kLanes) {
-    const LanePoints line = {load_lanes(&grid.px[b]) - p.x(), load_lanes(&grid.py[b]) - p.y(),
-                             load_lanes(&grid.pz[b]) - p.z()};
-    const LanePoints normal = {load_lanes(&grid.nx[b]), load_lanes(&grid.ny[b]), load_lanes(&grid.nz[b])};
+    const LanePoints line = grid.positions.load(b) - p, normal = grid.normals.load(b);
     const Lanes sq_distance = dot(line, line);
-    const Lanes off_a = magnitude(line.x * n.x() + line.y * n.y() + line.z * n.z());
-    const Lanes cosine = normal.x * n.x() + normal.y * n.y() + normal.z * n.z();
     const LaneInts pairs = (sq_distance >= limits.shortest * limits.shortest) &
-                           (sq_distance <= limits.longest * limits.longest) & (off_a <= limits.flatness) &
-                           (magnitude(dot(line, normal)) <= limits.flatness) & (cosine >= kSameNormalCosine);
+                           (sq_distance <= limits.longest * limits.longest) &
+                           (magnitude(dot(line, n)) <= limits.flatness) &
+                           (magnitude(dot(line, normal)) <= limits.flatness) & (dot(normal, n) >= kSameNormalCosine);
     for (int i = 0; i < std::min(kLanes, last - b); ++i) {
       if (pairs[i] != 0) found.push_back(b + i);
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/geometry/depth_map.h"
 #include "core/geometry/lanes.h"
@@ -23,6 +24,37 @@ inline LanePoints rotate(const Eigen::Isometry3f& T, const LanePoints& p) {
   return {m(0, 0) * p.x + m(0, 1) * p.y + m(0, 2) * p.z, m(1, 0) * p.x + m(1, 1) * p.y + m(1, 2) * p.z,
           m(2, 0) * p.x + m(2, 1) * p.y + m(2, 2) * p.z};
 }
+
+inline LanePoints transform(const Eigen::Isometry3f& T, const LanePoints& p) {
+  const LanePoints turned = rotate(T, p);
+  return {turned.x + T(0, 3), turned.y + T(1, 3), turned.z + T(2, 3)};
+}
+
+inline Lanes dot(const LanePoints& a, const Eigen::Vector3f& b) { return a.x * b.x() + a.y * b.y() + a.z * b.z(); }
+inline LanePoints operator-(const LanePoints& a, const Eigen::Vector3f& b) {
+  return {a.x - b.x(), a.y - b.y(), a.z - b.z()};
+}
+
+/// Points by coordinate, for reading eight that follow each other.
+struct PointColumns {
+  std::vector<float> x, y, z;
+
+  void clear() {
+    for (std::vector<float>* column : {&x, &y, &z}) column->clear();
+  }
+  void add(const Eigen::Vector3f& p) {
+    x.push_back(p.x());
+    y.push_back(p.y());
+    z.push_back(p.z());
+  }
+  /// To be called after the last add(): the last points can be read as any others.
+  void pad() {
+    for (std::vector<float>* column : {&x, &y, &z}) column->resize(column->size() + kLanes);
+  }
+  [[gnu::always_inline]] LanePoints load(std::size_t first) const {
+    return {load_lanes(&x[first]), load_lanes(&y[first]), load_lanes(&z[first])};
+  }
+};
 
 /// Three coordinates of points that come one by one, until they are loaded into lanes.
 struct LaneBuffer {
@@ -70,9 +102,7 @@ struct PointBlock {
       positions.set(i, source.position);
       normals.set(i, source.normal);
     }
-    const Eigen::Vector3f t = T_view_model.translation();
-    point = rotate(T_view_model, positions.load());
-    point = {point.x + t.x(), point.y + t.y(), point.z + t.z()};
+    point = transform(T_view_model, positions.load());
     normal = rotate(T_view_model, normals.load());
     for (int i = count; i < kLanes; ++i) point.z[i] = -1;
   }

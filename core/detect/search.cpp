@@ -59,11 +59,10 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
   });
 }
 
-/// Whether two poses are the same but for what refinement leaves.
-bool same_pose(const Candidate& a, const Candidate& b, const Eigen::Vector3f& centre, float distance) {
+/// Whether two poses are turned alike, but for what refinement leaves.
+bool same_turn(const Candidate& a, const Candidate& b) {
   constexpr float kLeastTrace = 2.985F;  // 7 degrees
-  return (a.T_view_model * centre - b.T_view_model * centre).squaredNorm() < distance * distance &&
-         a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
+  return a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
 }
 
 /// The best candidates of each neighbourhood, best first, without those that repeat a better one within `repeat`
@@ -75,17 +74,20 @@ std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, con
   const Eigen::Vector3f centre = model.centre.cast<float>();
   const float reach = kNeighbourhood * static_cast<float>(model.diameter);
   std::vector<Candidate> kept;
+  std::vector<Eigen::Vector3f> places;
   for (const Candidate& candidate : candidates) {
     if (static_cast<int>(kept.size()) >= most) break;
     const Eigen::Vector3f place = candidate.T_view_model * centre;
-    if (std::any_of(kept.begin(), kept.end(),
-                    [&](const Candidate& other) { return same_pose(candidate, other, centre, repeat); })) {
-      continue;
+    int around = 0;
+    bool repeats = false;
+    for (std::size_t i = 0; i < kept.size() && !repeats; ++i) {
+      const float sq_distance = (places[i] - place).squaredNorm();
+      around += static_cast<int>(sq_distance < reach * reach);
+      repeats = sq_distance < repeat * repeat && same_turn(candidate, kept[i]);
     }
-    const auto around = std::count_if(kept.begin(), kept.end(), [&](const Candidate& other) {
-      return (other.T_view_model * centre - place).squaredNorm() < reach * reach;
-    });
-    if (around < per_place) kept.push_back(candidate);
+    if (repeats || around >= per_place) continue;
+    kept.push_back(candidate);
+    places.push_back(place);
   }
   return kept;
 }

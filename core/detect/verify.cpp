@@ -40,9 +40,7 @@ struct OutlineBlock {
       normals.set(i, contour.normal);
       outwards.set(i, contour.outward);
     }
-    const Eigen::Vector3f t = T_view_model.translation();
-    point = rotate(T_view_model, positions.load());
-    point = {point.x + t.x(), point.y + t.y(), point.z + t.z()};
+    point = transform(T_view_model, positions.load());
     normal = rotate(T_view_model, normals.load());
     outward = rotate(T_view_model, outwards.load());
     for (int i = count; i < kLanes; ++i) point.z[i] = -1;

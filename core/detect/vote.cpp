@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/geometry/lanes.h"
+#include "core/detect/point_block.h"
 #include "core/parallel.h"
 #include "core/train/vector_pairs.h"
 
@@ -39,32 +39,25 @@ unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9],
 /// Scene points at a pair's length from P, and the directions to them.
 struct Ring {
   std::vector<int> points;
-  std::vector<float> x, y, z;  ///< with room to read lanes past the end
+  PointColumns directions;
 
   void clear() {
     points.clear();
-    for (std::vector<float>* component : {&x, &y, &z}) component->clear();
+    directions.clear();
   }
   void add(int point, const Eigen::Vector3f& direction) {
     points.push_back(point);
-    x.push_back(direction.x());
-    y.push_back(direction.y());
-    z.push_back(direction.z());
-  }
-  void pad() {
-    for (std::vector<float>* component : {&x, &y, &z}) component->resize(points.size() + kLanes);
+    directions.add(direction);
   }
 };
 
 /// Sets `found` to the points of a ring at a right angle to a direction.
 BINPOSE_VECTORISED
-void find_at_right_angle(const Ring& ring, float x, float y, float z, std::vector<int>& found) {
+void find_at_right_angle(const Ring& ring, const Eigen::Vector3f& direction, std::vector<int>& found) {
   found.clear();
   const int count = static_cast<int>(ring.points.size());
   for (int first = 0; first < count; first += kLanes) {
-    const Lanes cosine =
-        load_lanes(&ring.x[first]) * x + load_lanes(&ring.y[first]) * y + load_lanes(&ring.z[first]) * z;
-    const LaneInts right = magnitude(cosine) <= kRightAngleCosine;
+    const LaneInts right = magnitude(dot(ring.directions.load(first), direction)) <= kRightAngleCosine;
     for (int i = 0; i < std::min(kLanes, count - first); ++i) {
       if (right[i] != 0) found.push_back(ring.points[first + i]);
     }
@@ -89,7 +82,8 @@ class PairMatcher {
     for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
       const Ring &q1s = rings_[2 * scale], &q2s = rings_[2 * scale + 1];
       for (std::size_t a = 0; a < q1s.points.size(); ++a) {
-        find_at_right_angle(q2s, q1s.x[a], q1s.y[a], q1s.z[a], partners_);
+        const PointColumns& directions = q1s.directions;
+        find_at_right_angle(q2s, {directions.x[a], directions.y[a], directions.z[a]}, partners_);
         for (const int q2 : partners_) match_pair(static_cast<int>(scale), start, q1s.points[a], q2, out);
       }
     }
@@ -111,7 +105,7 @@ class PairMatcher {
         if (index >= 0 && index != start) sort_into_rings(index, scene_.points[index].position - p);
       }
     }
-    for (Ring& ring : rings_) ring.pad();
+    for (Ring& ring : rings_) ring.directions.pad();
   }
 
   void sort_into_rings(int index, const Eigen::Vector3f& offset) {

@@ -119,7 +119,6 @@ void fill_specks(DepthMap& map, const RunControl& control) {
 
 absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl& control) {
   if (absl::Status status = check_cloud(cloud); !status.ok()) return status;
-  const auto stopped = [&](std::size_t i) { return i % 1024 == 0 && control.stop.stop_requested(); };
   const Eigen::Vector3f sensor = cloud.sensor_position.cast<float>();
   Eigen::Vector3d direction = viewing_direction(cloud.points, sensor, 1 + cloud.points.size() / kEnoughForDirection);
   if (!(direction.norm() > 0)) direction = viewing_direction(cloud.points, sensor, 1);
@@ -137,7 +136,7 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
   const Eigen::Matrix3f R_view_scene = view.T_scene_view.linear().transpose().cast<float>();
   view.points.reserve(cloud.points.size());
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    if (stopped(i)) return control.status();
+    if (i % 1024 == 0 && control.stop.stop_requested()) return control.status();
     const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
     if (!p.allFinite() || !(p.z() > 1e-6F) || std::max(std::abs(p.x()), std::abs(p.y())) > kWidestTangent * p.z()) {
       continue;

@@ -86,6 +86,20 @@ Evidence surface_evidence_by_loop(const Scan& scan, const Eigen::Isometry3f& T, 
   return sum;
 }
 
+/// Calls `use(scan, T_view_model)` for true and shifted poses of a part that something hides in part.
+template <typename Use>
+void for_each_tried_pose(Use&& use) {
+  const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
+                                        testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
+  for (const Pose& pose : {kLying, kTilted}) {
+    const Scan scan(testing::l_block(), pose, {in_front});
+    for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
+      const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
+      use(scan, T);
+    }
+  }
+}
+
 /// How far the scene lies behind an outline point's surface carried on along `outward`; NaN where nothing was measured.
 float depth_behind_by_hand(const DepthMap& map, const ContourPoint& contour, const Eigen::Isometry3f& T, float distance,
                            float steepest) {
@@ -116,39 +130,27 @@ std::pair<int, int> outline_by_loop(const Scan& scan, const Eigen::Isometry3f& T
 }
 
 TEST(Verify, ComparesEightOutlinePointsAtATimeAsALoopDoesOneByOne) {
-  const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
-                                        testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
-  for (const Pose& pose : {kLying, kTilted}) {
-    const Scan scan(testing::l_block(), pose, {in_front});
-    for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
-      const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
-      const Evidence fast = verify(scan.map, scan.model, T, scan.options());
-      const auto [confirmed, contradicted] = outline_by_loop(scan, T, scan.options().tolerance);
-      const auto count = static_cast<float>(scan.model.outlines[nearest_viewpoint(scan.model, T)].size());
-      EXPECT_GT(confirmed + contradicted, 10);
-      // A point on a limit may fall to either side.
-      EXPECT_NEAR(fast.outline_confirmed * count, static_cast<float>(confirmed), 1.5F);
-      EXPECT_NEAR(fast.outline_contradicted * count, static_cast<float>(contradicted), 1.5F);
-    }
-  }
+  for_each_tried_pose([](const Scan& scan, const Eigen::Isometry3f& T) {
+    const Evidence fast = verify(scan.map, scan.model, T, scan.options());
+    const auto [confirmed, contradicted] = outline_by_loop(scan, T, scan.options().tolerance);
+    const auto count = static_cast<float>(scan.model.outlines[nearest_viewpoint(scan.model, T)].size());
+    EXPECT_GT(confirmed + contradicted, 10);
+    // A point on a limit may fall to either side.
+    EXPECT_NEAR(fast.outline_confirmed * count, static_cast<float>(confirmed), 1.5F);
+    EXPECT_NEAR(fast.outline_contradicted * count, static_cast<float>(contradicted), 1.5F);
+  });
 }
 
 TEST(Verify, ComparesEightPointsAtATimeAsALoopDoesOneByOne) {
-  const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
-                                        testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
-  for (const Pose& pose : {kLying, kTilted}) {
-    const Scan scan(testing::l_block(), pose, {in_front});
-    for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
-      const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
-      const Evidence fast = verify(scan.map, scan.model, T, scan.options());
-      const Evidence slow = surface_evidence_by_loop(scan, T, scan.options());
-      // A point on a limit may fall to either side.
-      EXPECT_NEAR(fast.explained, slow.explained, 2e-3F);
-      EXPECT_NEAR(fast.unexplained, slow.unexplained, 2e-3F);
-      EXPECT_NEAR(fast.violated, slow.violated, 2e-3F);
-      EXPECT_NEAR(fast.occluded, slow.occluded, 2e-3F);
-    }
-  }
+  for_each_tried_pose([](const Scan& scan, const Eigen::Isometry3f& T) {
+    const Evidence fast = verify(scan.map, scan.model, T, scan.options());
+    const Evidence slow = surface_evidence_by_loop(scan, T, scan.options());
+    // A point on a limit may fall to either side.
+    EXPECT_NEAR(fast.explained, slow.explained, 2e-3F);
+    EXPECT_NEAR(fast.unexplained, slow.unexplained, 2e-3F);
+    EXPECT_NEAR(fast.violated, slow.violated, 2e-3F);
+    EXPECT_NEAR(fast.occluded, slow.occluded, 2e-3F);
+  });
 }
 
 TEST(Verify, SharesAddUpToAtMostAll) {
