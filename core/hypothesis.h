@@ -17,14 +17,21 @@ struct PoseHypothesis {
   double explained_fraction = 0;    ///< of the surface that should be seen, the share that the scene explains
   double violated_fraction = 0;     ///< of the surface that should be seen, the share that the sensor saw through
   double unexplained_fraction = 0;  ///< of the surface that should be seen, the share where something else lies
-  double outline_confirmed = 0;  ///< of the outline that should be seen, the share where the scene's surface ends too
+  double outline_confirmed = 0;  ///< of the outline that should be seen, the share where the scene's surface ends too,
+                                 ///< as far as was measured
   double outline_contradicted = 0;  ///< ... the share where it does not, or where there is none
   double explained_area = 0;        ///< explained surface across the view, over the part's mean over all views
   double confidence = 1;            ///< that this pose is right and not one that shows nearly the same surface
   std::vector<Pose> variants;       ///< T_scene_model of nearly alike poses that the scene can't rule out; else empty
-  double residual = 0;              ///< root mean square distance of the explained surface, metres
-  double votes = 0;                 ///< weighted votes of the vector pairs
-  std::vector<int> occluded_by;     ///< indices into the result: the parts that hide some of this one, ascending
+  std::vector<Pose> equivalents;    ///< T_scene_model that show the same, where DetectParams::list_equivalents asks
+  /// Of a small motion T' = (translation, rotation about the model's origin) * T_scene_model, metres and radians, scene
+  /// axes.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  /// Motions of that kind that the scene hardly resists; see detect/uncertainty.h.
+  std::vector<Eigen::Matrix<double, 6, 1>> free_directions;
+  double residual = 0;           ///< root mean square distance of the explained surface, metres
+  double votes = 0;              ///< weighted votes of the vector pairs
+  std::vector<int> occluded_by;  ///< indices into the result: the parts that hide some of this one, ascending
 };
 
 enum class StopReason { kComplete, kDeadline, kMaxResults };

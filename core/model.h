@@ -13,17 +13,10 @@
 #include "core/pair_table.h"
 #include "core/params.h"
 #include "core/run_control.h"
+#include "core/symmetry.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
-
-/// Rigid motions that leave the surface where it was, within a tolerance; model frame.
-struct Symmetry {
-  std::vector<Pose> discrete = {Pose::Identity()};  ///< T_model_model, identity first
-  bool has_axis = false;                            ///< any turn about the axis as well
-  Eigen::Vector3d axis_point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d axis_direction = Eigen::Vector3d::UnitZ();
-};
 
 /// All that training produced; immutable once built and shared between threads. io/model_file.h saves the stored
 /// members; derive() rebuilds the others.

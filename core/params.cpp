@@ -40,6 +40,14 @@ absl::Status validate_lengths(const TrainParams& params) {
   return absl::OkStatus();
 }
 
+absl::Status validate_reference(const DetectParams& params) {
+  if (!params.reference_orientation || std::abs(params.reference_orientation->norm() - 1) <= 1e-6) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "reference_orientation has length %g; it must be a unit quaternion.", params.reference_orientation->norm()));
+}
+
 }  // namespace
 
 TrainParams TrainParams::paper() {
@@ -53,12 +61,36 @@ TrainParams TrainParams::paper() {
 DetectParams DetectParams::paper() {
   DetectParams params;
   params.normal_tolerance = 180 * kDegree;
-  params.cluster_limit = 100;
+  params.cluster_limit = 200;  // several for each of the twenty to thirty parts of a full bin
   params.use_contours = false;
   params.refine = false;
   params.verification = Verification::kAllPoints;
   params.min_score = 0;
   params.start_point_share = 1;
+  return params;
+}
+
+DetectParams DetectParams::fast() {
+  DetectParams params;
+  params.start_point_share = 0.08;
+  params.cluster_limit = 300;
+  params.clusters_per_place = 8;
+  params.refine_limit = 80;
+  params.refined_per_place = 3;
+  params.finalist_limit = 50;
+  params.finalists_per_place = 2;
+  return params;
+}
+
+DetectParams DetectParams::thorough() {
+  DetectParams params;
+  params.start_point_share = 0.8;
+  params.cluster_limit = 4000;
+  params.clusters_per_place = 60;
+  params.refine_limit = 1200;
+  params.refined_per_place = 24;
+  params.finalist_limit = 500;
+  params.finalists_per_place = 16;
   return params;
 }
 
@@ -81,8 +113,14 @@ absl::Status validate(const DetectParams& params) {
                       in_range("max_results", params.max_results, 1, 1000),
                       in_range("max_rejected", params.max_rejected, 0, 1000),
                       in_range("cluster_limit", params.cluster_limit, 1, 100000),
+                      in_range("clusters_per_place", params.clusters_per_place, 1, 1000),
+                      in_range("refine_limit", params.refine_limit, 1, 100000),
+                      in_range("refined_per_place", params.refined_per_place, 1, 1000),
+                      in_range("finalist_limit", params.finalist_limit, 1, 100000),
+                      in_range("finalists_per_place", params.finalists_per_place, 1, 1000),
                       in_range("start_point_share", params.start_point_share, 0.001, 1),
-                      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180)});
+                      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180),
+                      validate_reference(params), validate(params.space)});
 }
 
 }  // namespace binpose

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <Eigen/Geometry>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/search_space.h"
 
 /// Every parameter of training and detection with its default, its unit and its range. A default is written here only.
 namespace binpose {
@@ -52,19 +55,36 @@ enum class Verification {
 
 /// How a cloud is searched.
 struct DetectParams {
-  double min_score = 0.25;                 ///< [0, 1]
+  double min_score = 0.3;                  ///< [0, 1]
   int max_results = 100;                   ///< [1, 1000]
   int max_rejected = 0;                    ///< best poses below min_score that are answered apart, [0, 1000]
   double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
-  int cluster_limit = 1000;  ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
+  SearchSpace space;              ///< what is known of where parts are
+  bool list_equivalents = false;  ///< whether symmetric equivalents are answered too
+  /// Of symmetric equivalents the one turned least from this is answered: q_scene_model, unit.
+  std::optional<Eigen::Quaterniond> reference_orientation;
+
+  // Effort.
+  int cluster_limit = 1000;     ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
+  int clusters_per_place = 20;  ///< of those at most so many within a neighbourhood, [1, 1000]
+  int refine_limit = 300;       ///< poses that are refined, per source, [1, 100000]
+  int refined_per_place = 8;    ///< [1, 1000]
+  int finalist_limit = 150;     ///< of those, poses that are refined to the end, [1, 100000]
+  int finalists_per_place = 6;  ///< [1, 1000]
+
+  // Method.
   bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement
   bool refine = true;        ///< point-to-plane, after clustering
   Verification verification = Verification::kVisibleSurface;
 
   /// The paper's settings: no gate, few clusters, no contours, no refinement, all model points compared.
   static DetectParams paper();
+  /// Fewer starts, votes and poses: for parts that show well.
+  static DetectParams fast();
+  /// More of all: for parts that are hidden or seen badly, where time matters less.
+  static DetectParams thorough();
 
   bool operator==(const DetectParams&) const = default;
 };

@@ -9,8 +9,14 @@
 
 namespace binpose::server {
 
+/// How to search, in metres and radians.
+///
+/// @param model_ids        those that are searched for; what PosePrior::model_id names.
+/// @param metres_per_unit  of the lengths in `message`, which are the cloud's.
 /// Errors: INVALID_ARGUMENT, naming field, value and range.
-absl::StatusOr<DetectParams> to_detect_params(const v1::DetectParams& message);
+absl::StatusOr<DetectParams> to_detect_params(const v1::DetectParams& message,
+                                              const google::protobuf::RepeatedPtrField<std::string>& model_ids,
+                                              double metres_per_unit);
 
 /// The answer that holds `result`.
 ///

@@ -19,6 +19,28 @@ absl::StatusOr<double> metres_per_unit(std::string_view field, v1::LengthUnit un
   }
 }
 
+Eigen::Vector3d to_vector(const v1::Vector3& message) { return {message.x(), message.y(), message.z()}; }
+
+absl::StatusOr<Eigen::Quaterniond> to_rotation(std::string_view field, const v1::Quaternion& message) {
+  const Eigen::Quaterniond rotation(message.w(), message.x(), message.y(), message.z());
+  const double length = rotation.norm();
+  if (length > 1e-6 && length < 1e6) return rotation.normalized();
+  return absl::InvalidArgumentError(
+      absl::StrFormat("%s is (x %g, y %g, z %g, w %g); it must be a rotation, a quaternion of length 1.", field,
+                      message.x(), message.y(), message.z(), message.w()));
+}
+
+absl::StatusOr<Pose> to_pose(std::string_view field, const v1::Pose& message, double metres_per_unit) {
+  Pose pose = Pose::Identity();
+  if (message.has_orientation()) {
+    const auto rotation = to_rotation(absl::StrFormat("%s.orientation", field), message.orientation());
+    if (!rotation.ok()) return rotation.status();
+    pose.linear() = rotation->toRotationMatrix();
+  }
+  pose.translation() = metres_per_unit * to_vector(message.position());
+  return pose;
+}
+
 v1::Vector3 to_proto(const Eigen::Vector3d& vector) {
   v1::Vector3 message;
   message.set_x(vector.x());

@@ -77,7 +77,9 @@ absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, 
   if (absl::Status status = check_request(request); !status.ok()) return status;
   const auto stored = find_models(request, models);
   if (!stored.ok()) return stored.status();
-  const absl::StatusOr<DetectParams> params = to_detect_params(request.params());
+  const absl::StatusOr<double> unit = metres_per_unit("cloud.unit", request.cloud().unit());
+  if (!unit.ok()) return unit.status();
+  const absl::StatusOr<DetectParams> params = to_detect_params(request.params(), request.model_ids(), *unit);
   if (!params.ok()) return params.status();
   const absl::StatusOr<PointCloud> cloud = to_cloud(request.cloud(), {.stop = control.stop});
   if (!cloud.ok()) return cloud.status();
@@ -86,7 +88,7 @@ absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, 
   for (const auto& model : *stored) wanted.push_back(&model->model);
   const absl::StatusOr<DetectResult> result = detect(*cloud, wanted, *params, control);
   if (!result.ok()) return result.status();
-  return to_response(*result, request.model_ids(), *metres_per_unit("cloud.unit", request.cloud().unit()));
+  return to_response(*result, request.model_ids(), *unit);
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* DetectionService::Detect(

@@ -1,6 +1,9 @@
 #include "client/cli/scan_options.h"
 
+#include <google/protobuf/util/json_util.h>
+
 #include "client/cli/choice.h"
+#include "client/read_file.h"
 #include "client/scene.h"
 
 namespace binpose::client::cli {
@@ -28,6 +31,14 @@ void add_search_options(CLI::App& command, ScanOptions& options) {
                      "Largest angle between alike normals of scene and model, degrees");
   command.add_flag("--keep-support-plane", options.keep_support_plane,
                    "Search the plane that the parts lie on as well, instead of leaving it out");
+  add_choice<v1::Effort>(
+      command, "--effort", options.effort,
+      {{"fast", v1::EFFORT_FAST}, {"balanced", v1::EFFORT_BALANCED}, {"thorough", v1::EFFORT_THOROUGH}},
+      "How much of the scan is searched");
+  command
+      .add_option("--params", options.params,
+                  "DetectParams as JSON, for what has no option here: regions, bin, plane, priors, ...")
+      ->type_name("FILE");
   command.add_option("--time-budget", options.time_budget,
                      "Seconds after which the server answers the best that it has found so far");
 }
@@ -37,6 +48,19 @@ std::string request_id_of(const std::string& scene) {
   return scene.size() <= kMaxBytes ? scene : scene.substr(scene.size() - kMaxBytes);
 }
 
+namespace {
+
+absl::Status read_params(const std::string& path, v1::DetectParams& params) {
+  const absl::StatusOr<std::string> text = read_file(path);
+  if (!text.ok()) return text.status();
+  const auto parsed = google::protobuf::util::JsonStringToMessage(*text, &params);
+  if (parsed.ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      path + " holds no DetectParams as JSON, such as {\"minScore\": 0.4}: " + std::string(parsed.message()));
+}
+
+}  // namespace
+
 absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const std::string& scene) {
   absl::StatusOr<v1::PointCloud> cloud = read_scene(scene, options.camera, options.unit);
   if (!cloud.ok()) return cloud.status();
@@ -44,7 +68,11 @@ absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const
   request.set_request_id(request_id_of(scene));
   request.mutable_model_ids()->Add(options.model_ids.begin(), options.model_ids.end());
   *request.mutable_cloud() = *std::move(cloud);
+  if (options.params.has_value()) {
+    if (absl::Status read = read_params(*options.params, *request.mutable_params()); !read.ok()) return read;
+  }
   v1::DetectParams& params = *request.mutable_params();
+  if (options.effort != v1::EFFORT_UNSPECIFIED) params.set_effort(options.effort);
   if (options.max_results.has_value()) params.set_max_results(*options.max_results);
   if (options.max_rejected.has_value()) params.set_max_rejected(*options.max_rejected);
   if (options.min_score.has_value()) params.set_min_score(*options.min_score);

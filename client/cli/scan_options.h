@@ -23,6 +23,8 @@ struct ScanOptions {
   std::optional<double> start_point_share;
   std::optional<double> normal_tolerance_degrees;
   bool keep_support_plane = false;
+  v1::Effort effort = v1::EFFORT_UNSPECIFIED;
+  std::optional<std::string> params;  ///< file of DetectParams as JSON
   std::optional<double> time_budget;  ///< seconds
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/detect/background.h"
+#include "core/detect/describe.h"
 #include "core/detect/rank.h"
 #include "core/detect/search.h"
 #include "core/detect/stage_timer.h"
@@ -38,31 +40,11 @@ DepthMap prepare(const SensorView& view, const Model& model, const DetectParams&
   DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing), control);
   if (view.normals.empty()) estimate_steady_normals(map, control);
   if (control.interrupted()) return map;
-  if (params.remove_support_plane) mark_support_plane(map, static_cast<float>(model.diameter));
+  const bool is_background_known = params.space.support_plane || params.space.bin_interior;
+  if (params.remove_support_plane && !is_background_known) mark_support_plane(map, static_cast<float>(model.diameter));
+  mark_outside(map, params.space, model.diameter);
   find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control);
   return map;
-}
-
-PoseHypothesis to_hypothesis(const Candidate& candidate, const DepthMap& map) {
-  PoseHypothesis hypothesis;
-  hypothesis.model_index = candidate.model_index;
-  hypothesis.T_scene_model = map.T_scene_view * Pose(candidate.T_view_model.cast<double>());
-  hypothesis.score = candidate.score();
-  hypothesis.visible_fraction = 1 - candidate.evidence.occluded;
-  hypothesis.explained_fraction = candidate.evidence.explained;
-  hypothesis.violated_fraction = candidate.evidence.violated;
-  hypothesis.unexplained_fraction = candidate.evidence.unexplained;
-  hypothesis.outline_confirmed = candidate.evidence.outline_confirmed;
-  hypothesis.outline_contradicted = candidate.evidence.outline_contradicted;
-  hypothesis.explained_area = candidate.evidence.area;
-  hypothesis.confidence = candidate.confidence;
-  for (const Eigen::Isometry3f& rival : candidate.rivals) {
-    hypothesis.variants.push_back(map.T_scene_view * Pose(rival.cast<double>()));
-  }
-  hypothesis.residual = candidate.evidence.residual;
-  hypothesis.votes = candidate.votes;
-  hypothesis.occluded_by = candidate.occluded_by;
-  return hypothesis;
 }
 
 /// One sentence for an empty result: how far the search came.
@@ -102,13 +84,19 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   }
   if (control.stop.stop_requested()) return control.status();
 
+  const auto describe_one = [&](const Candidate& candidate) {
+    return describe(candidate, finest, *models[candidate.model_index], verification[candidate.model_index], params);
+  };
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    Ranking ranking =
-        rank(finest, models, verification, std::move(candidates), params.min_score, params.max_rejected, control);
+    const RankOptions options = {verification, params.min_score, params.max_rejected,
+                                 [&](int m, const Eigen::Isometry3f& T_view_model) {
+                                   return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
+                                 }};
+    Ranking ranking = rank(finest, models, std::move(candidates), options, control);
     if (control.stop.stop_requested()) return control.status();
     candidates = std::move(ranking.accepted);
-    for (const Candidate& candidate : ranking.rejected) result.rejected.push_back(to_hypothesis(candidate, finest));
+    for (const Candidate& candidate : ranking.rejected) result.rejected.push_back(describe_one(candidate));
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   if (candidates.size() > static_cast<std::size_t>(params.max_results)) {
@@ -117,7 +105,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   }
   for (Candidate& candidate : candidates) {
     std::erase_if(candidate.occluded_by, [&](int i) { return i >= params.max_results; });
-    result.hypotheses.push_back(to_hypothesis(candidate, finest));
+    result.hypotheses.push_back(describe_one(candidate));
   }
   if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats));
   stats.total_seconds = seconds_since(start);

@@ -51,8 +51,8 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
 /// Candidates in line for acceptance, best first.
 class Line {
  public:
-  Line(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
-       std::vector<Candidate> candidates, const RunControl& control)
+  Line(const DepthMap& map, std::span<const Model* const> models, std::vector<Candidate> candidates,
+       const RankOptions& options, const RunControl& control)
       : map_(map),
         models_(models),
         options_(options),
@@ -69,8 +69,8 @@ class Line {
            !control_.stop.stop_requested()) {
       if (!stands_firm()) continue;
       const Candidate& candidate = candidates_[next_++];
-      own_pixels(map_, *models_[candidate.model_index], candidate, options_[candidate.model_index].tolerance,
-                 accepted_count_++, owner_);
+      own_pixels(map_, *models_[candidate.model_index], candidate,
+                 options_.verification[candidate.model_index].tolerance, accepted_count_++, owner_);
       accepted.push_back(candidate);
     }
     return accepted;
@@ -86,10 +86,12 @@ class Line {
   bool stands_firm() {
     Candidate& candidate = candidates_[next_];
     const Model& model = *models_[candidate.model_index];
-    const VerifyOptions& options = options_[candidate.model_index];
+    const VerifyOptions& options = options_.verification[candidate.model_index];
     const float before = candidate.score();
     if (!candidate.has_variant) {
-      VariantChoice choice = choose_variant(map_, model, candidate.T_view_model, options);
+      VariantChoice choice = choose_variant(
+          map_, model, candidate.T_view_model, options,
+          [&](const Eigen::Isometry3f& T_view_model) { return options_.allowed(candidate.model_index, T_view_model); });
       candidate.has_variant = true;
       candidate.T_view_model = choice.T_view_model;
       candidate.confidence = choice.confidence;
@@ -104,7 +106,7 @@ class Line {
 
   const DepthMap& map_;
   const std::span<const Model* const> models_;
-  const std::span<const VerifyOptions> options_;
+  const RankOptions& options_;
   const RunControl& control_;
   std::vector<Candidate> candidates_;
   std::size_t next_ = 0;
@@ -114,18 +116,18 @@ class Line {
 
 }  // namespace
 
-Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
-             std::vector<Candidate> candidates, double min_score, int max_rejected, const RunControl& control) {
-  Line line(map, models, options, std::move(candidates), control);
+Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vector<Candidate> candidates,
+             const RankOptions& options, const RunControl& control) {
+  Line line(map, models, std::move(candidates), options, control);
   Ranking ranking;
-  ranking.accepted = line.accept(min_score, std::numeric_limits<std::size_t>::max());
+  ranking.accepted = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
   for (std::size_t i = 0; i < ranking.accepted.size(); ++i) {
     Candidate& candidate = ranking.accepted[i];
     candidate.occluded_by =
         find_occluders(map, *models[candidate.model_index], candidate, static_cast<int>(i), line.owner());
   }
   constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
-  ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(max_rejected));
+  ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(options.max_rejected));
   return ranking;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -32,15 +33,23 @@ struct Ranking {
   std::vector<Candidate> rejected;  ///< the best of the others, without `occluded_by`
 };
 
+/// How candidates are ranked.
+struct RankOptions {
+  std::span<const VerifyOptions> verification = {};  ///< the final one of each model's candidates, by model index
+  double min_score = 0;  ///< candidates that score less, at first or for want of free pixels, are not accepted
+  int max_rejected = 0;  ///< of those, so many are ranked on among themselves; what is accepted does not depend on it
+  /// Whether a nearly alike pose of a candidate may be.
+  std::function<bool(int model_index, const Eigen::Isometry3f& T_view_model)> allowed = [](int, const auto&) {
+    return true;
+  };
+};
+
 /// Ranks candidates. An accepted pose owns the pixels that it explains. The rest are judged anew without these, so that
 /// a second pose of the same part loses its evidence, whatever the part's symmetry. Deterministic: equal scores in the
 /// order of the list.
 ///
-/// @param options       final verification of each model's candidates, by model index.
-/// @param min_score     candidates that score less, at first or for want of free pixels, are not accepted.
-/// @param max_rejected  of those, so many are ranked on among themselves; what is accepted does not depend on it.
 /// Ends early when the caller of `control` cancels; past a deadline what was found so far is still ranked.
-Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::span<const VerifyOptions> options,
-             std::vector<Candidate> candidates, double min_score, int max_rejected = 0, const RunControl& control = {});
+Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vector<Candidate> candidates,
+             const RankOptions& options, const RunControl& control = {});
 
 }  // namespace binpose

@@ -115,14 +115,28 @@ void add_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, 
   }
 }
 
-/// The step that solves the equations, damped; rotations are damped as what they do at the part's radius.
-Eigen::Matrix<float, 6, 1> solve(const NormalEquations& equations, float radius) {
+/// The lower triangle, mirrored.
+Eigen::Matrix<double, 6, 6> normal_matrix(const NormalEquations& equations) {
   Eigen::Matrix<double, 6, 6> A;
-  Eigen::Matrix<double, 6, 1> b;
   for (int r = 0; r < 6; ++r) {
     for (int c = 0; c <= r; ++c) A(r, c) = A(c, r) = equations.A[r][c];
-    b[r] = equations.b[r];
   }
+  return A;
+}
+
+/// The same with translations before rotations.
+Eigen::Matrix<double, 6, 6> by_motion(const NormalEquations& equations) {
+  const Eigen::Matrix<double, 6, 6> A = normal_matrix(equations);
+  Eigen::Matrix<double, 6, 6> swapped;
+  swapped << A.bottomRightCorner<3, 3>(), A.bottomLeftCorner<3, 3>(), A.topRightCorner<3, 3>(), A.topLeftCorner<3, 3>();
+  return swapped;
+}
+
+/// The step that solves the equations, damped; rotations are damped as what they do at the part's radius.
+Eigen::Matrix<float, 6, 1> solve(const NormalEquations& equations, float radius) {
+  Eigen::Matrix<double, 6, 6> A = normal_matrix(equations);
+  Eigen::Matrix<double, 6, 1> b;
+  for (int r = 0; r < 6; ++r) b[r] = equations.b[r];
   const double damping = kDamping * A.diagonal().tail<3>().sum() / 3;
   A.diagonal().head<3>().array() += damping * radius * radius;
   A.diagonal().tail<3>().array() += damping;
@@ -157,6 +171,15 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
     T = move * T;
   }
   return T;
+}
+
+Information information_of(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float gate) {
+  const int viewpoint = nearest_viewpoint(model, T_view_model);
+  const Eigen::Vector3f pivot = T_view_model * model.centre.cast<float>();
+  NormalEquations surface, outline;
+  add_surface(map, model, model.visible_from[viewpoint], T_view_model, pivot, gate, surface);
+  add_outline(map, model.outlines[viewpoint], T_view_model, pivot, gate, 1, outline);
+  return {by_motion(surface), by_motion(outline), static_cast<double>(surface.rows)};
 }
 
 }  // namespace binpose

@@ -19,4 +19,15 @@ struct RefineOptions {
 Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
                          const RefineOptions& options);
 
+/// How much the scene resists small motions of a pose: sums of J^T J over what is drawn. J: distance by motion, metres
+/// by (translation, rotation about the part's centre), view frame.
+struct Information {
+  Eigen::Matrix<double, 6, 6> surface = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 6> outline = Eigen::Matrix<double, 6, 6>::Zero();
+  double surface_count = 0;  ///< surface points that are drawn
+};
+
+/// The normal matrices of one step of refinement, from all that lies within `gate` metres.
+Information information_of(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float gate);
+
 }  // namespace binpose

@@ -26,20 +26,16 @@ constexpr float kLastGate = 0.025F;
 
 constexpr int kCoarsePoints = 80;
 constexpr int kCoarseOutlineStride = 3;
-constexpr int kClustersPerNeighbourhood = 20;
-constexpr int kRefinedPerNeighbourhood = 8;
-constexpr int kMostRefined = 300;
 constexpr int kFirstIterations = 4;
 constexpr int kFirstPoints = 100;
 constexpr int kFirstOutlineStride = 3;
 constexpr int kMiddlePoints = 300;
-constexpr int kFinalistsPerNeighbourhood = 6;
-constexpr int kMostFinalists = 150;
 constexpr float kRepeat = 0.02F;
 constexpr float kFinestGate = 0.015F;
 constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
 constexpr float kAlignmentCutoff = 0.1F;
+constexpr double kVotedAngle = 25 * kDegree;  // that a pose made of votes may be off
 
 // Of the time left before a deadline: votes that nobody has the time to verify are worth nothing.
 constexpr double kSurfaceVotesShare = 0.25;
@@ -101,8 +97,18 @@ Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams&
   return vote(scene, starts, map, model, params, control);
 }
 
+/// Leaves out the votes for places outside of every region, lest they take the clusters of those inside.
+void keep_votes_in_regions(const DepthMap& map, const SearchSpace& space, double slack, std::vector<PoseVote>& votes) {
+  if (space.regions.empty()) return;
+  std::erase_if(votes, [&](const PoseVote& vote) {
+    const Eigen::Vector3d centre = map.T_scene_view * vote.centre.cast<double>();
+    return std::none_of(space.regions.begin(), space.regions.end(),
+                        [&](const OrientedBox& region) { return region.contains(centre, slack); });
+  });
+}
+
 /// Clusters of votes that stand a coarse verification: where the model may be, best first.
-std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, const Model& model, int model_index,
+std::vector<Candidate> find_candidates(Votes votes, const DepthMap& map, const Model& model, int model_index,
                                        const DetectParams& params, const RunControl& control, DetectStats& stats) {
   const auto diameter = static_cast<float>(model.diameter);
   stats.scene_pair_count += votes.scene_pairs;
@@ -110,17 +116,21 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
   std::vector<Candidate> candidates;
   {
     const StageTimer timer(stats.cluster_seconds);
+    const Slack voted = {kClusterRadius * model.diameter, kVotedAngle};
+    keep_votes_in_regions(map, params.space, voted.distance, votes.votes);
     ClusterOptions options;
     options.radius = kClusterRadius * diameter;
     options.neighbourhood = kNeighbourhood * diameter;
-    options.most_per_neighbourhood = kClustersPerNeighbourhood;
+    options.most_per_neighbourhood = params.clusters_per_place;
     options.most = params.cluster_limit;
     for (const PoseCluster& c : cluster(votes.votes, options, control)) {
       Candidate candidate;
       candidate.model_index = model_index;
       candidate.T_view_model = pose_of(c, model);
       candidate.votes = c.votes;
-      candidates.push_back(candidate);
+      if (is_allowed(map, model, model_index, params.space, voted, candidate.T_view_model)) {
+        candidates.push_back(candidate);
+      }
     }
     stats.cluster_count += candidates.size();
   }
@@ -133,7 +143,7 @@ std::vector<Candidate> find_candidates(const Votes& votes, const DepthMap& map, 
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
-  return best_of_each_place(std::move(candidates), model, kRefinedPerNeighbourhood, kMostRefined, 0);
+  return best_of_each_place(std::move(candidates), model, params.refined_per_place, params.refine_limit, 0);
 }
 
 /// Refines each candidate and judges it anew.
@@ -154,7 +164,7 @@ void refine_all(const DepthMap& map, const Model& model, const RefineOptions& re
 
 /// Refinement from the accuracy of votes to that of the sensor: all candidates with few points, the best with many.
 std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model, std::vector<Candidate> candidates,
-                                         const RunControl& control, DetectStats& stats) {
+                                         const DetectParams& params, const RunControl& control, DetectStats& stats) {
   const auto diameter = static_cast<float>(model.diameter);
   RefineOptions refinement;
   refinement.first_gate = kFirstGate * diameter;
@@ -165,8 +175,8 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
-  candidates =
-      best_of_each_place(std::move(candidates), model, kFinalistsPerNeighbourhood, kMostFinalists, kRepeat * diameter);
+  candidates = best_of_each_place(std::move(candidates), model, params.finalists_per_place, params.finalist_limit,
+                                  kRepeat * diameter);
   refinement.first_gate = kLastGate * diameter;
   refinement.last_gate = kFinestGate * diameter;
   refinement.iterations = kFinestIterations;
@@ -178,7 +188,7 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
 
 /// The clusters by the paper's alignment error, one a place.
 std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, const DepthMap& map, const Model& model,
-                                          DetectStats& stats) {
+                                          const DetectParams& params, DetectStats& stats) {
   const StageTimer timer(stats.verify_seconds);
   const float cutoff = kAlignmentCutoff * static_cast<float>(model.diameter);
   for (Candidate& candidate : candidates) {
@@ -187,7 +197,7 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
     candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
   }
   stats.verified_count += candidates.size();
-  return best_of_each_place(std::move(candidates), model, 1, kMostFinalists, 0);
+  return best_of_each_place(std::move(candidates), model, 1, params.finalist_limit, 0);
 }
 
 }  // namespace
@@ -196,6 +206,12 @@ VerifyOptions final_verification(const DepthMap& map, const Model& model) {
   VerifyOptions options;
   options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
   return options;
+}
+
+bool is_allowed(const DepthMap& map, const Model& model, int model_index, const SearchSpace& space, const Slack& slack,
+                const Eigen::Isometry3f& T_view_model) {
+  return allows(space, model_index, model.symmetry, model.centre, map.T_scene_view * Pose(T_view_model.cast<double>()),
+                map.T_scene_view.translation(), slack);
 }
 
 std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,
@@ -211,13 +227,18 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
   }
   // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
   if (control.stop.stop_requested()) return {};
-  std::vector<Candidate> candidates = find_candidates(by_surface, map, model, model_index, params, control, stats);
-  const std::vector<Candidate> more = find_candidates(by_contour, map, model, model_index, params, control, stats);
+  std::vector<Candidate> candidates =
+      find_candidates(std::move(by_surface), map, model, model_index, params, control, stats);
+  const std::vector<Candidate> more =
+      find_candidates(std::move(by_contour), map, model, model_index, params, control, stats);
   candidates.insert(candidates.end(), more.begin(), more.end());
-  if (params.refine) candidates = refine_to_the_end(map, model, std::move(candidates), control, stats);
+  if (params.refine) candidates = refine_to_the_end(map, model, std::move(candidates), params, control, stats);
   if (params.verification == Verification::kAllPoints) {
-    candidates = compare_all_points(std::move(candidates), map, model, stats);
+    candidates = compare_all_points(std::move(candidates), map, model, params, stats);
   }
+  std::erase_if(candidates, [&](const Candidate& candidate) {
+    return !is_allowed(map, model, model_index, params.space, {}, candidate.T_view_model);
+  });
   return candidates;
 }
 

@@ -13,6 +13,10 @@ namespace binpose {
 /// How closely a refined pose of the model must agree with the map.
 VerifyOptions final_verification(const DepthMap& map, const Model& model);
 
+/// Whether the caller's search space allows a pose.
+bool is_allowed(const DepthMap& map, const Model& model, int model_index, const SearchSpace& space, const Slack& slack,
+                const Eigen::Isometry3f& T_view_model);
+
 /// Where one model may be: votes of both sources, clusters, coarse verification, refinement, final verification.
 /// Unranked, with doubles. Counts and times are added to `stats`. Ends early when `control` interrupts.
 std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,

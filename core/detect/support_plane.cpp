@@ -15,7 +15,7 @@ constexpr float kLeastExtent = 2;  // diameters, both ways
 constexpr float kRelativeTolerance = 0.012F;
 constexpr float kSameNormalCosine = 0.94F;  // 20 degrees
 
-struct Plane {
+struct ViewPlane {
   Eigen::Vector3f normal;  // towards the sensor
   float offset;            // normal . point
 };
@@ -34,13 +34,14 @@ std::vector<int> evenly_taken(const DepthMap& map, int count) {
   return taken;
 }
 
-bool on_plane(const DepthMap& map, int i, const Plane& plane, float tolerance) {
+bool on_plane(const DepthMap& map, int i, const ViewPlane& plane, float tolerance) {
   return std::abs(plane.normal.dot(map.points[i]) - plane.offset) <= tolerance &&
          plane.normal.dot(map.normals[i]) >= kSameNormalCosine;
 }
 
 /// Least-squares plane through the probes that lie on a plane.
-Plane refit(const DepthMap& map, const std::vector<int>& probes, const Plane& plane, float tolerance, float& extent) {
+ViewPlane refit(const DepthMap& map, const std::vector<int>& probes, const ViewPlane& plane, float tolerance,
+                float& extent) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   int count = 0;
@@ -61,12 +62,12 @@ Plane refit(const DepthMap& map, const std::vector<int>& probes, const Plane& pl
 }
 
 /// The seed plane that holds most probes among those with next to nothing behind them.
-std::optional<Plane> find_plane(const DepthMap& map, float diameter, float tolerance) {
+std::optional<ViewPlane> find_plane(const DepthMap& map, float diameter, float tolerance) {
   const std::vector<int> probes = evenly_taken(map, kProbes);
-  std::optional<Plane> best;
+  std::optional<ViewPlane> best;
   auto most = static_cast<int>(kLeastShare * static_cast<double>(probes.size()));
   for (const int seed : evenly_taken(map, kSeeds)) {
-    const Plane plane{map.normals[seed], map.normals[seed].dot(map.points[seed])};
+    const ViewPlane plane{map.normals[seed], map.normals[seed].dot(map.points[seed])};
     int on = 0, behind = 0;
     for (const int i : probes) {
       on += on_plane(map, i, plane, 2 * tolerance);
@@ -74,7 +75,7 @@ std::optional<Plane> find_plane(const DepthMap& map, float diameter, float toler
     }
     if (on <= most || behind > kMostBehind * static_cast<double>(probes.size())) continue;
     float extent = 0;
-    const Plane fitted = refit(map, probes, plane, 2 * tolerance, extent);
+    const ViewPlane fitted = refit(map, probes, plane, 2 * tolerance, extent);
     if (extent < kLeastExtent * diameter) continue;
     most = on;
     best = fitted;
@@ -84,9 +85,11 @@ std::optional<Plane> find_plane(const DepthMap& map, float diameter, float toler
 
 }  // namespace
 
+float plane_tolerance(const DepthMap& map, float diameter) { return kRelativeTolerance * diameter + 2 * map.noise; }
+
 bool mark_support_plane(DepthMap& map, float diameter) {
-  const float tolerance = kRelativeTolerance * diameter + 2 * map.noise;
-  const std::optional<Plane> plane = find_plane(map, diameter, tolerance);
+  const float tolerance = plane_tolerance(map, diameter);
+  const std::optional<ViewPlane> plane = find_plane(map, diameter, tolerance);
   if (!plane) return false;
   for (int i = 0; i < static_cast<int>(map.points.size()); ++i) {
     map.background[i] = map.has_normal(i) && on_plane(map, i, *plane, tolerance) ? 1 : 0;

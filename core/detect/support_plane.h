@@ -13,4 +13,7 @@ namespace binpose {
 /// @return          whether there is such a plane.
 bool mark_support_plane(DepthMap& map, float diameter);
 
+/// How far from a plane a pixel counts as its own, metres.
+float plane_tolerance(const DepthMap& map, float diameter);
+
 }  // namespace binpose

@@ -38,11 +38,15 @@ float telling_evidence(const DepthMap& map, const Model& model, const Eigen::Iso
 }  // namespace
 
 VariantChoice choose_variant(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
-                             const VerifyOptions& options) {
+                             const VerifyOptions& options,
+                             const std::function<bool(const Eigen::Isometry3f&)>& allowed) {
   VariantChoice choice{T_view_model, 1, {}};
   if (model.similar_poses.empty()) return choice;
   std::vector<Eigen::Isometry3f> poses = {T_view_model};
-  for (const Pose& T_model_model : model.similar_poses) poses.push_back(T_view_model * T_model_model.cast<float>());
+  for (const Pose& T_model_model : model.similar_poses) {
+    const Eigen::Isometry3f variant = T_view_model * T_model_model.cast<float>();
+    if (allowed(variant)) poses.push_back(variant);
+  }
   std::vector<float> evidence;
   evidence.reserve(poses.size());
   for (const Eigen::Isometry3f& pose : poses) evidence.push_back(telling_evidence(map, model, pose, options));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "core/detect/verify.h"
@@ -17,7 +18,9 @@ struct VariantChoice {
 /// differ. Points that something hides or that were not measured say nothing.
 ///
 /// @param options  as for the final verification.
-VariantChoice choose_variant(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
-                             const VerifyOptions& options);
+/// @param allowed  whether a variant's pose may be; the pose itself may.
+VariantChoice choose_variant(
+    const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, const VerifyOptions& options,
+    const std::function<bool(const Eigen::Isometry3f& T_view_model)>& allowed = [](const auto&) { return true; });
 
 }  // namespace binpose

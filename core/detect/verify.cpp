@@ -18,7 +18,7 @@ constexpr float kOutlinePenalty = 1.3F;
 /// What the sampling of the model leaves as residual even without noise, diameters.
 constexpr float kRelativeFloor = 0.0012F;
 /// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
-/// may all be hidden, or have nothing measured beyond it.
+/// may all be hidden.
 constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;
 /// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
 constexpr float kSteepest = 0.25882F;
@@ -81,9 +81,11 @@ void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline
     const Lanes outside = block.depth_behind(map, kOutside * map.pixel_size, 1, known_outside);
     const LaneInts missing = known_inside & (inside > options.tolerance);
     const LaneInts hidden = known_inside & (inside < -options.tolerance);
-    const LaneInts judged = known_outside & ~hidden & ~missing;
-    confirmed -= judged & (outside > options.tolerance);
-    contradicted -= missing | (judged & (magnitude(outside) <= options.tolerance));
+    const LaneInts judged = ~hidden & ~missing;
+    // Sensors see little past an edge: a surface that is measured up to it and not beyond ends there as far as they
+    // tell.
+    confirmed -= judged & ((known_outside & (outside > options.tolerance)) | (known_inside & ~known_outside));
+    contradicted -= missing | (judged & known_outside & (magnitude(outside) <= options.tolerance));
   }
   const float scale =
       static_cast<float>(options.outline_stride) / static_cast<float>(std::max<std::size_t>(1, outline.size()));

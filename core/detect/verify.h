@@ -21,7 +21,7 @@ struct Evidence {
   float violated = 0;              ///< measured clearly behind: the sensor looked through the model
   float occluded = 0;              ///< measured clearly in front: something hides the model
   float unexplained = 0;           ///< measured near, with another normal
-  float outline_confirmed = 0;     ///< of the outline points: the surface is there and ends there
+  float outline_confirmed = 0;     ///< of the outline points: the surface is there and ends, or is not measured beyond
   float outline_contradicted = 0;  ///< of the outline points: the surface goes on, or is missing
   float area = 0;                  ///< of the explained surface across the view, over the part's mean over all views
   float residual = 0;              ///< root mean square distance of the explained points, metres

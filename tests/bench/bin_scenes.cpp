@@ -161,9 +161,13 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   app.add_flag("--per-scene", per_scene);
   app.add_flag("--dump", dump);
   app.add_option("--threads", control.threads);
-  app.add_option("--min-score", detect_params.min_score);
+  std::string effort = "balanced";
+  const CLI::Validator efforts = CLI::IsMember({"fast", "balanced", "thorough"});
+  app.add_option("--effort", effort, "the base that the other options change")->check(efforts);
+  std::optional<double> min_score, share;
+  app.add_option("--min-score", min_score);
   app.add_option("--pairs", train_params.pairs_per_point);
-  app.add_option("--share", detect_params.start_point_share);
+  app.add_option("--share", share);
   std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
                                                      {"observability", PairSelection::kObservability},
                                                      {"integration", PairSelection::kIntegration}};
@@ -184,6 +188,10 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
     train_params.selection = paper_selection;
     detect_params = DetectParams::paper();
   }
+  if (effort == "fast") detect_params = DetectParams::fast();
+  if (effort == "thorough") detect_params = DetectParams::thorough();
+  if (min_score) detect_params.min_score = *min_score;
+  if (share) detect_params.start_point_share = *share;
   if (cluster_limit) detect_params.cluster_limit = *cluster_limit;
 
   const Trained trained = train_all(parts_folder, only, train_params, control);

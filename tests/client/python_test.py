@@ -72,6 +72,22 @@ class PythonTest(unittest.TestCase):
         self.assertTrue(all(part.score >= 0.6 and 0 < part.confidence <= 1 for part in result.parts))
         self.assertTrue(1 <= len(result.rejected) <= 4 and all(part.score < 0.6 for part in result.rejected))
 
+    def test_what_the_cell_knows_limits_the_search_and_every_pose_says_how_well_it_is_known(self):
+        service = binpose.v1.detection_service_pb2
+        best = self.client.detect("part", scan()).parts[0]
+        self.assertEqual(best.covariance.shape, (6, 6))
+        self.assertTrue((np.linalg.eigvalsh(best.covariance) > 0).all())
+        self.assertEqual(best.free_directions.shape[1], 6)
+        region = service.OrientedBox()
+        region.pose.position.x, region.pose.position.y, region.pose.position.z = best.T_scene_model[:3, 3]
+        region.size.x = region.size.y = region.size.z = 40
+        params = service.DetectParams(regions=[region], list_equivalents=True)
+        found = self.client.detect("part", scan(), params=params).parts
+        np.testing.assert_allclose(found[0].T_scene_model[:3, 3], best.T_scene_model[:3, 3], atol=0.5)
+        self.assertTrue(all(len(part.equivalents) == len(found[0].equivalents) for part in found))
+        with self.assertRaisesRegex(binpose.BinposeError, "regions.size"):
+            self.client.detect("part", scan(), params=service.DetectParams(regions=[service.OrientedBox()]))
+
     def test_metres_in_floats_and_organised_points_tell_the_same_scene(self):
         best = self.client.detect("part", scan()).parts[0]
         metres = scan((depth * camera["depth_unit_mm"] / 1000).astype(np.float32), scale=1.0, unit="m")

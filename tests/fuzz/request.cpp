@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (server::request_id_of(bytes).size() > server::kMaxRequestIdBytes) std::abort();
   v1::DetectRequest request;
   if (!server::decode(bytes, request)) return 0;
-  static_cast<void>(server::to_detect_params(request.params()));
+  static_cast<void>(server::to_detect_params(request.params(), request.model_ids(), 0.001));
   static_cast<void>(server::to_cloud(request.cloud()));
   return 0;
 }

@@ -69,7 +69,7 @@ struct Case;
 
 template <>
 struct Case<v1::DetectParams> {
-  static auto convert(const v1::DetectParams& message) { return server::to_detect_params(message); }
+  static auto convert(const v1::DetectParams& message) { return server::to_detect_params(message, {}, 1); }
 };
 
 template <>

@@ -33,7 +33,7 @@ struct Scene {
   }
   Ranking rank_all(std::vector<Candidate> candidates, double min_score, int max_rejected) const {
     const Model* models[] = {&model};
-    return rank(map, models, options, std::move(candidates), min_score, max_rejected);
+    return rank(map, models, std::move(candidates), {options, min_score, max_rejected});
   }
   std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
     return rank_all(std::move(candidates), min_score, 0).accepted;

@@ -20,12 +20,17 @@ class Part:
     occluded_by: tuple  # indices into Result.parts: take those first
     confidence: float  # that this pose is right, not one of `variants`
     variants: tuple = field(repr=False)  # 4 x 4 each: nearly alike poses that the scan does not rule out
+    equivalents: tuple = field(repr=False)  # 4 x 4 each: poses that show the same, where list_equivalents asked
+    covariance: np.ndarray = field(repr=False)  # 6 x 6: x, y, z, then rotation about them; scan's unit and radians
+    free_directions: np.ndarray = field(repr=False)  # n x 6, same order: motions that the scan hardly resists
 
     @classmethod
     def of(cls, hypothesis):
         return cls(hypothesis.model_id, matrix_of(hypothesis.pose), hypothesis.score, hypothesis.visible_fraction,
                    hypothesis.explained_fraction, hypothesis.violated_fraction, hypothesis.residual, hypothesis.votes,
-                   tuple(hypothesis.occluded_by), hypothesis.confidence, tuple(map(matrix_of, hypothesis.variants)))
+                   tuple(hypothesis.occluded_by), hypothesis.confidence, tuple(map(matrix_of, hypothesis.variants)),
+                   tuple(map(matrix_of, hypothesis.equivalents)), np.array(hypothesis.covariance).reshape(-1, 6),
+                   np.array([_motion_of(twist) for twist in hypothesis.free_directions]).reshape(-1, 6))
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,10 @@ class Result:
     def of(cls, answer):
         return cls(tuple(map(Part.of, answer.hypotheses)), tuple(answer.warnings), answer.stats, answer.request_id,
                    tuple(map(Part.of, answer.rejected)))
+
+
+def _motion_of(twist):
+    return [*(getattr(twist.translation, axis) for axis in "xyz"), *(getattr(twist.rotation, axis) for axis in "xyz")]
 
 
 def matrix_of(pose):

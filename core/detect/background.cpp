@@ -1,0 +1,36 @@
+#include "core/detect/background.h"
+
+#include <algorithm>
+
+#include "core/detect/support_plane.h"
+
+namespace binpose {
+namespace {
+
+/// Whether a part's surface can lie there: inside of the walls and the floor by more than `margin`. Open towards +z.
+bool inside(const OrientedBox& bin, const Eigen::Vector3d& p_scene, double margin) {
+  const Eigen::Vector3d p = bin.T_scene_box.inverse() * p_scene;
+  const Eigen::Vector3d half = 0.5 * bin.size;
+  return std::abs(p.x()) < half.x() - margin && std::abs(p.y()) < half.y() - margin && p.z() > margin - half.z();
+}
+
+bool is_outside(const SearchSpace& space, const Eigen::Vector3d& p_scene, double diameter, double margin) {
+  const auto near = [&](const OrientedBox& region) { return region.contains(p_scene, diameter); };
+  if (!space.regions.empty() && std::none_of(space.regions.begin(), space.regions.end(), near)) return true;
+  if (space.support_plane && space.support_plane->normal.dot(p_scene) <= space.support_plane->offset + margin)
+    return true;
+  return space.bin_interior && !inside(*space.bin_interior, p_scene, margin);
+}
+
+}  // namespace
+
+void mark_outside(DepthMap& map, const SearchSpace& space, double diameter) {
+  if (space.regions.empty() && !space.support_plane && !space.bin_interior) return;
+  const double margin = plane_tolerance(map, static_cast<float>(diameter));
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    if (!map.measured(static_cast<int>(i))) continue;
+    if (is_outside(space, map.T_scene_view * map.points[i].cast<double>(), diameter, margin)) map.background[i] = 1;
+  }
+}
+
+}  // namespace binpose
