@@ -8,6 +8,7 @@
 #include "core/train/sample_surface.h"
 #include "core/train/select.h"
 #include "core/train/self_similarity.h"
+#include "core/train/shells.h"
 #include "core/train/vector_pairs.h"
 #include "core/train/visibility.h"
 
@@ -29,12 +30,21 @@ constexpr double kRelativeTellingSpacing = 0.01;
 constexpr std::size_t kMostTelling = 2000;
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
-/// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
-std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter, const RunControl& control) {
-  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter, control);
+/// The surface as points whose normals point outwards, however the mesh is wound: those of a shell are made to agree,
+/// then turned to the side from which it is seen.
+std::vector<SurfacePoint> oriented_surface(const Mesh& mesh, const Shells& shells, double diameter,
+                                           const RunControl& control) {
+  std::vector<std::uint32_t> triangle_of;
+  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter, control, &triangle_of);
+  if (control.interrupted()) return dense;
+  std::vector<std::uint32_t> shell_of(dense.size());
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    if (shells.turned[triangle_of[i]]) dense[i].normal = -dense[i].normal;
+    shell_of[i] = shells.first[triangle_of[i]];
+  }
   constexpr int kViewsToTellTheSides = 60;
   const std::vector<bool> behind =
-      seen_from_behind(dense, view_directions(kViewsToTellTheSides), kRelativeCell * diameter, control);
+      seen_from_behind(dense, shell_of, view_directions(kViewsToTellTheSides), kRelativeCell * diameter, control);
   for (std::size_t i = 0; i < dense.size(); ++i) {
     if (behind[i]) dense[i].normal = -dense[i].normal;
   }
@@ -87,7 +97,8 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   model.diameter = extent.diameter;
   model.box_min = extent.box_min;
   model.box_max = extent.box_max;
-  const std::vector<SurfacePoint> dense = outer_surface(mesh, model.diameter, control);
+  const Shells shells = find_shells(mesh, control);
+  const std::vector<SurfacePoint> dense = oriented_surface(mesh, shells, model.diameter, control);
   model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter, control);
   model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter, control);
   if (absl::Status status = control.status(); !status.ok()) return status;
