@@ -1,9 +1,11 @@
 #include "core/train/train.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/train/contour_pairs.h"
 #include "core/train/mesh_extent.h"
+#include "core/train/mesh_report.h"
 #include "core/train/outlines.h"
 #include "core/train/sample_surface.h"
 #include "core/train/select.h"
@@ -49,6 +51,14 @@ std::vector<SurfacePoint> oriented_surface(const Mesh& mesh, const Shells& shell
     if (behind[i]) dense[i].normal = -dense[i].normal;
   }
   return dense;
+}
+
+/// Share of the points that no viewpoint sees.
+double unseen_share(const std::vector<ViewMask>& masks) {
+  const auto unseen = std::count_if(masks.begin(), masks.end(), [](const ViewMask& mask) {
+    return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word == 0; });
+  });
+  return static_cast<double>(unseen) / static_cast<double>(masks.size());
 }
 
 /// `most` entries of a list, or all.
@@ -98,6 +108,7 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   model.box_min = extent.box_min;
   model.box_max = extent.box_max;
   const Shells shells = find_shells(mesh, control);
+  const MeshReport report = examine_mesh(mesh, shells, model.diameter, control);
   const std::vector<SurfacePoint> dense = oriented_surface(mesh, shells, model.diameter, control);
   model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter, control);
   model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter, control);
@@ -110,6 +121,7 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   if (absl::Status status = enter(TrainStage::kVisibility, 0.1); !status.ok()) return status;
   const std::vector<Eigen::Vector3f> viewpoints = view_directions(params.viewpoint_count);
   model.visibility = visibility(dense, model.surface, viewpoints, kRelativeCell * model.diameter, control);
+  model.warnings = mesh_warnings(report, unseen_share(model.visibility));
   const std::vector<ViewMask> pair_masks =
       visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
 

@@ -113,6 +113,15 @@ TEST(Train, KeepsTheNormalsOfAThinPlateAndOfADeepBore) {
   }
 }
 
+TEST(Train, WarnsOfWhatIsWrongWithTheMesh) {
+  EXPECT_THAT(train(testing::l_block(), quick(), {})->warnings, ::testing::IsEmpty());
+  EXPECT_THAT(train(with_turned(testing::l_block(), 1), quick(), {})->warnings,
+              ::testing::ElementsAre(::testing::HasSubstr("inside out")));
+  const Mesh crate = testing::box({0.1F, 0.1F, 0.1F});
+  EXPECT_THAT(train(testing::joined(crate, testing::box({0.05F, 0.05F, 0.05F})), quick(), {})->warnings,
+              ::testing::ElementsAre(::testing::HasSubstr("20 % of the mesh's surface can't be seen")));
+}
+
 TEST(Train, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
   const std::string once = serialize_model(*train(testing::l_block(), quick(), {}));
   for (const int threads : {1, 2, 4}) {
