@@ -120,10 +120,14 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
 
   if (absl::Status status = enter(TrainStage::kVisibility, 0.1); !status.ok()) return status;
   const std::vector<Eigen::Vector3f> viewpoints = view_directions(params.viewpoint_count);
-  model.visibility = visibility(dense, model.surface, viewpoints, kRelativeCell * model.diameter, control);
+  // Both in one go, as projecting the dense points takes most of the time.
+  std::vector<SurfacePoint> judged = model.surface;
+  judged.insert(judged.end(), model.pair_points.begin(), model.pair_points.end());
+  model.visibility = visibility(dense, judged, viewpoints, kRelativeCell * model.diameter, control);
+  const auto of_pairs = model.visibility.begin() + static_cast<std::ptrdiff_t>(model.surface.size());
+  const std::vector<ViewMask> pair_masks(of_pairs, model.visibility.end());
+  model.visibility.erase(of_pairs, model.visibility.end());
   model.warnings = mesh_warnings(report, unseen_share(model.visibility));
-  const std::vector<ViewMask> pair_masks =
-      visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
 
   std::vector<std::vector<ContourPoint>> views = outlines(
       dense, viewpoints, model.diameter, kRelativePixel * model.diameter, kRelativeStep * model.diameter, control);

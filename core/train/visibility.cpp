@@ -21,8 +21,10 @@ class ProjectionPlane {
   ProjectionPlane(std::span<const SurfacePoint> dense, const Eigen::Vector3f& viewpoint, float cell)
       : towards_viewer_(viewpoint), right_(viewpoint.unitOrthogonal()), up_(viewpoint.cross(right_)), cell_(cell) {
     Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = Eigen::Array2f::Constant(-INFINITY);
+    std::vector<Eigen::Array2f> places;
+    places.reserve(dense.size());
     for (const SurfacePoint& point : dense) {
-      const Eigen::Array2f at = across(point.position);
+      const Eigen::Array2f& at = places.emplace_back(across(point.position));
       low = low.min(at);
       high = high.max(at);
     }
@@ -30,9 +32,9 @@ class ProjectionPlane {
     width_ = static_cast<int>((high[0] - low[0]) / cell) + 1;
     const int height = static_cast<int>((high[1] - low[1]) / cell) + 1;
     nearest_.assign(static_cast<std::size_t>(width_) * height, -INFINITY);
-    for (const SurfacePoint& point : dense) {
-      float& nearest = nearest_[index(point.position)];
-      nearest = std::max(nearest, towards_viewer_.dot(point.position));
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      float& nearest = nearest_[index(places[i])];
+      nearest = std::max(nearest, towards_viewer_.dot(dense[i].position));
     }
   }
 
@@ -52,9 +54,10 @@ class ProjectionPlane {
 
  private:
   Eigen::Array2f across(const Eigen::Vector3f& p) const { return {right_.dot(p), up_.dot(p)}; }
+  std::size_t index(const Eigen::Vector3f& p) const { return index(across(p)); }
   /// Points lie inside the plane's extent, as all are points of the surface that it was made from.
-  std::size_t index(const Eigen::Vector3f& p) const {
-    const Eigen::Array2i c = ((across(p) - origin_) / cell_).cast<int>();
+  std::size_t index(const Eigen::Array2f& place) const {
+    const Eigen::Array2i c = ((place - origin_) / cell_).cast<int>();
     const std::size_t i = static_cast<std::size_t>(std::max(0, c[1])) * width_ + std::clamp(c[0], 0, width_ - 1);
     return std::min(i, nearest_.size() - 1);
   }
