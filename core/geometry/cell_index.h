@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
@@ -29,20 +29,33 @@ class CellIndex {
       const auto found = cells_.find(key(centre + Eigen::Array3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
       if (found == cells_.end()) continue;
       for (const std::uint32_t other : found->second) {
-        const float sq_distance = (points_[other].position - point.position).squaredNorm();
-        if (sq_distance < least && points_[other].normal.dot(point.normal) > kSameSideCosine) {
-          best = static_cast<int>(other);
-          least = sq_distance;
-        }
+        if (!matches(points_[other], point, least)) continue;
+        best = static_cast<int>(other);
+        least = (points_[other].position - point.position).squaredNorm();
       }
     }
     return best;
   }
-  bool near(const SurfacePoint& point, float distance) const { return nearest(point, distance) >= 0; }
+  /// Whether nearest() finds one; many times as fast where it does.
+  bool near(const SurfacePoint& point, float distance) const {
+    const Eigen::Array3i centre = cell(point.position);
+    for (int k = 0; k < 27; ++k) {
+      const int i = (k + 13) % 27;  // the point's own cell first
+      const auto found = cells_.find(key(centre + Eigen::Array3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
+      if (found == cells_.end()) continue;
+      for (const std::uint32_t other : found->second) {
+        if (matches(points_[other], point, distance * distance)) return true;
+      }
+    }
+    return false;
+  }
 
  private:
   static constexpr float kSameSideCosine = 0.5F;
 
+  static bool matches(const SurfacePoint& a, const SurfacePoint& b, float below_sq_distance) {
+    return (a.position - b.position).squaredNorm() < below_sq_distance && a.normal.dot(b.normal) > kSameSideCosine;
+  }
   Eigen::Array3i cell(const Eigen::Vector3f& p) const { return (p.array() * inverse_).floor().cast<int>(); }
   static std::uint64_t key(const Eigen::Array3i& c) {
     constexpr std::uint64_t kMask = (1U << 21) - 1;
@@ -51,7 +64,7 @@ class CellIndex {
 
   const std::vector<SurfacePoint>& points_;
   float inverse_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  absl::flat_hash_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
 };
 
 }  // namespace binpose

@@ -26,11 +26,13 @@ std::vector<std::uint32_t> scrambled_order(std::uint32_t count) {
 
 }  // namespace
 
-std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control) {
+std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control,
+                                  std::vector<std::uint32_t>* triangle_of) {
   std::vector<SurfacePoint> points;
   double owed = 0.5;  // area not yet turned into points, in units of one point
   std::uint64_t serial = 0;
-  for (const auto& triangle : mesh.triangles) {
+  for (std::uint32_t index = 0; index < mesh.triangles.size(); ++index) {
+    const auto& triangle = mesh.triangles[index];
     const Eigen::Vector3f& a = mesh.vertices[triangle[0]];
     const Eigen::Vector3f ab = mesh.vertices[triangle[1]] - a;
     const Eigen::Vector3f ac = mesh.vertices[triangle[2]] - a;
@@ -49,6 +51,7 @@ std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunCon
         t = 1 - t;
       }
       points.push_back({a + static_cast<float>(s) * ab + static_cast<float>(t) * ac, normal});
+      if (triangle_of) triangle_of->push_back(index);
     }
   }
   return points;

@@ -25,8 +25,9 @@ constexpr int kTurns = 36;
 constexpr int kCoarsePoints = 80;
 constexpr double kCoarseShare = 0.6;
 constexpr std::size_t kMostRefined = 300;
-constexpr int kRefinements = 8;
+constexpr int kRefinements = 4;  // at each gate
 constexpr std::size_t kRefinePoints = 150;
+constexpr std::size_t kPolishPoints = 1000;
 constexpr std::size_t kGlancedPoints = 400;  // a first judgement
 constexpr std::size_t kJudgedPoints = 4000;
 constexpr double kSimilarShare = 0.75;  // of the surface that a turn must leave on itself
@@ -129,38 +130,6 @@ std::vector<RatedTurn> coarse_turns(const Nearness& nearness, const std::vector<
   return kept;
 }
 
-/// Point-to-plane steps that draw the turned points to the surface.
-Eigen::Isometry3f settle(const CellIndex& index, const std::vector<SurfacePoint>& surface,
-                         const Eigen::Vector3f& middle, float diameter, Eigen::Isometry3f T) {
-  const std::size_t count = std::min(kRefinePoints, surface.size());
-  const float radius = diameter / 2;
-  for (int i = 0; i < kRefinements; ++i) {
-    const float gate = static_cast<float>(kReach * (i < 4 ? 0.7 : 0.35)) * diameter;
-    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-    for (std::size_t k = 0; k < count; ++k) {
-      const SurfacePoint moved{T * surface[k].position, T.linear() * surface[k].normal};
-      const int found = index.nearest(moved, gate);
-      if (found < 0) continue;
-      Eigen::Matrix<double, 6, 1> row;
-      row.head<3>() = ((moved.position - middle) / radius).cross(surface[found].normal).cast<double>();
-      row.tail<3>() = surface[found].normal.cast<double>();
-      A += row * row.transpose();
-      b += row * static_cast<double>(surface[found].normal.dot(surface[found].position - moved.position));
-    }
-    // Damped: turns about an axis of revolution are free.
-    A.diagonal().array() += 1e-4 * A.trace() / 6;
-    const Eigen::Matrix<float, 6, 1> step = A.ldlt().solve(b).cast<float>();
-    const float angle = step.head<3>().norm() / radius;
-    if (!step.allFinite()) break;
-    Eigen::Isometry3f move = Eigen::Isometry3f::Identity();
-    if (angle > 1e-9F) move.linear() = Eigen::AngleAxisf(angle, step.head<3>().normalized()).toRotationMatrix();
-    move.translation() = middle + step.tail<3>() - move.linear() * middle;
-    T = move * T;
-  }
-  return T;
-}
-
 /// Share of the points that a turn leaves on the surface.
 double share_on_surface(const CellIndex& index, const std::vector<SurfacePoint>& points, const Eigen::Isometry3f& T,
                         std::size_t most, float tolerance) {
@@ -201,7 +170,8 @@ std::pair<Eigen::Vector3f, Eigen::Vector3f> axis_of(const Eigen::Isometry3f& T, 
 class TurnSearch {
  public:
   TurnSearch(const std::vector<SurfacePoint>& dense, const std::vector<SurfacePoint>& surface, double diameter)
-      : surface_(surface),
+      : dense_(dense),
+        surface_(surface),
         diameter_(static_cast<float>(diameter)),
         on_surface_(static_cast<float>(kOnSurface) * diameter_),
         by_place_(surface, static_cast<float>(0.7 * kReach) * diameter_),
@@ -219,12 +189,14 @@ class TurnSearch {
     const Nearness nearness(surface_, diameter_);
     for (const RatedTurn& coarse : coarse_turns(nearness, surface_, middle_, radius(), control)) {
       if (control.interrupted()) break;
-      add(settle(by_place_, surface_, middle_, diameter_, coarse.T), found);
+      const float far = static_cast<float>(0.7 * kReach) * diameter_;
+      const Eigen::Isometry3f near_by = settle(by_place_, surface_, kRefinePoints, far, coarse.T);
+      add(settle(by_place_, surface_, kRefinePoints, far / 2, near_by), found);
     }
     complete(found, control);
     std::stable_sort(found.begin() + 1, found.end(),
                      [](const RatedTurn& a, const RatedTurn& b) { return a.share > b.share; });
-    return peaks(found, control);
+    return polished(peaks(found, control), control);
   }
 
   /// Whether the part is one of revolution about the axis of a turn.
@@ -247,6 +219,51 @@ class TurnSearch {
  private:
   double share(const Eigen::Isometry3f& T, std::size_t most) const {
     return share_on_surface(finely_by_place_, surface_, T, most, on_surface_);
+  }
+
+  /// Point-to-plane steps that draw the first points of the surface, turned, to a target.
+  ///
+  /// @param index  of the target.
+  /// @param gate   how far a point may be from it, metres.
+  Eigen::Isometry3f settle(const CellIndex& index, const std::vector<SurfacePoint>& target, std::size_t most,
+                           float gate, Eigen::Isometry3f T) const {
+    const std::size_t count = std::min(most, surface_.size());
+    for (int i = 0; i < kRefinements; ++i) {
+      Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+      Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+      for (std::size_t k = 0; k < count; ++k) {
+        const SurfacePoint moved{T * surface_[k].position, T.linear() * surface_[k].normal};
+        const int found = index.nearest(moved, gate);
+        if (found < 0) continue;
+        const SurfacePoint& near = target[found];
+        Eigen::Matrix<double, 6, 1> row;
+        row.head<3>() = ((moved.position - middle_) / radius()).cross(near.normal).cast<double>();
+        row.tail<3>() = near.normal.cast<double>();
+        A += row * row.transpose();
+        b += row * static_cast<double>(near.normal.dot(near.position - moved.position));
+      }
+      // Damped: turns about an axis of revolution are free.
+      A.diagonal().array() += 1e-4 * A.trace() / 6;
+      const Eigen::Matrix<float, 6, 1> step = A.ldlt().solve(b).cast<float>();
+      const float angle = step.head<3>().norm() / radius();
+      if (!step.allFinite()) break;
+      Eigen::Isometry3f move = Eigen::Isometry3f::Identity();
+      if (angle > 1e-9F) move.linear() = Eigen::AngleAxisf(angle, step.head<3>().normalized()).toRotationMatrix();
+      move.translation() = middle_ + step.tail<3>() - move.linear() * middle_;
+      T = move * T;
+    }
+    return T;
+  }
+
+  /// The turns with the symmetric ones drawn to where they fit best: a small socket or key leaves a whole range of
+  /// angles on the surface, to within the tolerance, and what was found lies anywhere in it.
+  std::vector<RatedTurn> polished(std::vector<RatedTurn> turns, const RunControl& control) const {
+    for (std::size_t i = 1; i < turns.size() && turns[i].share >= kSameShare && !control.interrupted(); ++i) {
+      Eigen::Isometry3f T = turns[i].T;
+      for (int round = 0; round < 2; ++round) T = settle(finely_by_place_, dense_, kPolishPoints, on_surface_, T);
+      if (share(T, kJudgedPoints) >= kSameShare) turns[i].T = T;
+    }
+    return turns;
   }
 
   void add(const Eigen::Isometry3f& T, std::vector<RatedTurn>& found) const {
@@ -281,6 +298,7 @@ class TurnSearch {
     }
   }
 
+  const std::vector<SurfacePoint>& dense_;
   const std::vector<SurfacePoint>& surface_;
   float diameter_, on_surface_;
   CellIndex by_place_, finely_by_place_;

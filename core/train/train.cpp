@@ -1,13 +1,16 @@
 #include "core/train/train.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/train/contour_pairs.h"
 #include "core/train/mesh_extent.h"
+#include "core/train/mesh_report.h"
 #include "core/train/outlines.h"
 #include "core/train/sample_surface.h"
 #include "core/train/select.h"
 #include "core/train/self_similarity.h"
+#include "core/train/shells.h"
 #include "core/train/vector_pairs.h"
 #include "core/train/visibility.h"
 
@@ -29,16 +32,33 @@ constexpr double kRelativeTellingSpacing = 0.01;
 constexpr std::size_t kMostTelling = 2000;
 constexpr std::size_t kMostPoints = 65535;  // indices have 16 bits
 
-/// The surface as points, seen from outside: faces that no viewpoint reaches are kept only if there are no others.
-std::vector<SurfacePoint> outer_surface(const Mesh& mesh, double diameter, const RunControl& control) {
-  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter, control);
+/// The surface as points whose normals point outwards, however the mesh is wound: those of a shell are made to agree,
+/// then turned to the side from which it is seen.
+std::vector<SurfacePoint> oriented_surface(const Mesh& mesh, const Shells& shells, double diameter,
+                                           const RunControl& control) {
+  std::vector<std::uint32_t> triangle_of;
+  std::vector<SurfacePoint> dense = scatter(mesh, kRelativeDenseSpacing * diameter, control, &triangle_of);
+  if (control.interrupted()) return dense;
+  std::vector<std::uint32_t> shell_of(dense.size());
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    if (shells.turned[triangle_of[i]]) dense[i].normal = -dense[i].normal;
+    shell_of[i] = shells.first[triangle_of[i]];
+  }
   constexpr int kViewsToTellTheSides = 60;
   const std::vector<bool> behind =
-      seen_from_behind(dense, view_directions(kViewsToTellTheSides), kRelativeCell * diameter, control);
+      seen_from_behind(dense, shell_of, view_directions(kViewsToTellTheSides), kRelativeCell * diameter, control);
   for (std::size_t i = 0; i < dense.size(); ++i) {
     if (behind[i]) dense[i].normal = -dense[i].normal;
   }
   return dense;
+}
+
+/// Share of the points that no viewpoint sees.
+double unseen_share(const std::vector<ViewMask>& masks) {
+  const auto unseen = std::count_if(masks.begin(), masks.end(), [](const ViewMask& mask) {
+    return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word == 0; });
+  });
+  return static_cast<double>(unseen) / static_cast<double>(masks.size());
 }
 
 /// `most` entries of a list, or all.
@@ -87,7 +107,9 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   model.diameter = extent.diameter;
   model.box_min = extent.box_min;
   model.box_max = extent.box_max;
-  const std::vector<SurfacePoint> dense = outer_surface(mesh, model.diameter, control);
+  const Shells shells = find_shells(mesh, control);
+  const MeshReport report = examine_mesh(mesh, shells, model.diameter, control);
+  const std::vector<SurfacePoint> dense = oriented_surface(mesh, shells, model.diameter, control);
   model.surface = thin_evenly(dense, kRelativeSurfaceSpacing * model.diameter, control);
   model.pair_points = thin_evenly(dense, params.relative_sampling * model.diameter, control);
   if (absl::Status status = control.status(); !status.ok()) return status;
@@ -98,9 +120,14 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
 
   if (absl::Status status = enter(TrainStage::kVisibility, 0.1); !status.ok()) return status;
   const std::vector<Eigen::Vector3f> viewpoints = view_directions(params.viewpoint_count);
-  model.visibility = visibility(dense, model.surface, viewpoints, kRelativeCell * model.diameter, control);
-  const std::vector<ViewMask> pair_masks =
-      visibility(dense, model.pair_points, viewpoints, kRelativeCell * model.diameter, control);
+  // Both in one go, as projecting the dense points takes most of the time.
+  std::vector<SurfacePoint> judged = model.surface;
+  judged.insert(judged.end(), model.pair_points.begin(), model.pair_points.end());
+  model.visibility = visibility(dense, judged, viewpoints, kRelativeCell * model.diameter, control);
+  const auto of_pairs = model.visibility.begin() + static_cast<std::ptrdiff_t>(model.surface.size());
+  const std::vector<ViewMask> pair_masks(of_pairs, model.visibility.end());
+  model.visibility.erase(of_pairs, model.visibility.end());
+  model.warnings = mesh_warnings(report, unseen_share(model.visibility));
 
   std::vector<std::vector<ContourPoint>> views = outlines(
       dense, viewpoints, model.diameter, kRelativePixel * model.diameter, kRelativeStep * model.diameter, control);

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <unordered_map>
 
 #include "core/parallel.h"
 
@@ -11,6 +12,8 @@ namespace binpose {
 namespace {
 
 constexpr float kGrazingCosine = 0.17364818F;  // 80 degrees off the view
+/// Votes for one side over votes for the other, from which on the sides are told apart.
+constexpr double kClearMajority = 1.25;
 
 /// The nearest surface in each cell of a plane across the view. Depths count towards the viewer.
 class ProjectionPlane {
@@ -18,8 +21,10 @@ class ProjectionPlane {
   ProjectionPlane(std::span<const SurfacePoint> dense, const Eigen::Vector3f& viewpoint, float cell)
       : towards_viewer_(viewpoint), right_(viewpoint.unitOrthogonal()), up_(viewpoint.cross(right_)), cell_(cell) {
     Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = Eigen::Array2f::Constant(-INFINITY);
+    std::vector<Eigen::Array2f> places;
+    places.reserve(dense.size());
     for (const SurfacePoint& point : dense) {
-      const Eigen::Array2f at = across(point.position);
+      const Eigen::Array2f& at = places.emplace_back(across(point.position));
       low = low.min(at);
       high = high.max(at);
     }
@@ -27,9 +32,9 @@ class ProjectionPlane {
     width_ = static_cast<int>((high[0] - low[0]) / cell) + 1;
     const int height = static_cast<int>((high[1] - low[1]) / cell) + 1;
     nearest_.assign(static_cast<std::size_t>(width_) * height, -INFINITY);
-    for (const SurfacePoint& point : dense) {
-      float& nearest = nearest_[index(point.position)];
-      nearest = std::max(nearest, towards_viewer_.dot(point.position));
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      float& nearest = nearest_[index(places[i])];
+      nearest = std::max(nearest, towards_viewer_.dot(dense[i].position));
     }
   }
 
@@ -40,13 +45,19 @@ class ProjectionPlane {
     return towards_viewer_.dot(point.position) >= nearest_[index(point.position)] - cell_ * (0.3F + 1.2F * slope);
   }
 
+  /// Whether the point is the one that its cell shows.
+  bool is_nearest(const SurfacePoint& point) const {
+    return towards_viewer_.dot(point.position) >= nearest_[index(point.position)];
+  }
+
   float cosine(const SurfacePoint& point) const { return towards_viewer_.dot(point.normal); }
 
  private:
   Eigen::Array2f across(const Eigen::Vector3f& p) const { return {right_.dot(p), up_.dot(p)}; }
+  std::size_t index(const Eigen::Vector3f& p) const { return index(across(p)); }
   /// Points lie inside the plane's extent, as all are points of the surface that it was made from.
-  std::size_t index(const Eigen::Vector3f& p) const {
-    const Eigen::Array2i c = ((across(p) - origin_) / cell_).cast<int>();
+  std::size_t index(const Eigen::Array2f& place) const {
+    const Eigen::Array2i c = ((place - origin_) / cell_).cast<int>();
     const std::size_t i = static_cast<std::size_t>(std::max(0, c[1])) * width_ + std::clamp(c[0], 0, width_ - 1);
     return std::min(i, nearest_.size() - 1);
   }
@@ -91,20 +102,33 @@ double observability(const ViewMask& p, const ViewMask& q1, const ViewMask& q2, 
   return static_cast<double>(seen) / view_count;
 }
 
-std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const Eigen::Vector3f> viewpoints,
-                                   double cell, const RunControl& control) {
-  std::vector<int> votes(dense.size(), 0);
+std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const std::uint32_t> shell_of,
+                                   std::span<const Eigen::Vector3f> viewpoints, double cell,
+                                   const RunControl& control) {
+  struct Votes {
+    int front = 0, behind = 0;
+    bool clear() const { return std::max(front, behind) > kClearMajority * std::min(front, behind); }
+  };
+  std::unordered_map<std::uint32_t, Votes> by_shell;
+  Votes all;
   for (const Eigen::Vector3f& viewpoint : viewpoints) {
     if (control.interrupted()) break;
     const ProjectionPlane plane(dense, viewpoint, static_cast<float>(cell));
     for (std::size_t i = 0; i < dense.size(); ++i) {
       const float cosine = plane.cosine(dense[i]);
       // Where the surface is seen edge on, either side of a thin wall may win.
-      if (std::abs(cosine) > 0.5F && plane.reaches(dense[i])) votes[i] += cosine > 0 ? 1 : -1;
+      if (std::abs(cosine) < 0.5F || !plane.is_nearest(dense[i])) continue;
+      Votes& shell = by_shell[shell_of[i]];
+      ++(cosine > 0 ? shell.front : shell.behind);
+      ++(cosine > 0 ? all.front : all.behind);
     }
   }
   std::vector<bool> behind(dense.size());
-  for (std::size_t i = 0; i < dense.size(); ++i) behind[i] = votes[i] < 0;
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    const auto found = by_shell.find(shell_of[i]);
+    const Votes& votes = found != by_shell.end() && found->second.clear() ? found->second : all;
+    behind[i] = votes.clear() && votes.behind > votes.front;
+  }
   return behind;
 }
 

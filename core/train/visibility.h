@@ -32,9 +32,15 @@ double observability(const ViewMask& point, int view_count);
 /// Cost: view_count / 64 word operations.
 double observability(const ViewMask& p, const ViewMask& q1, const ViewMask& q2, int view_count);
 
-/// Turns normals that point into the part: per point, whether the outward side is the other one, judged by the side
-/// from which it is seen. Repairs meshes with inconsistent winding. Judged from fewer views when `control` interrupts.
-std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const Eigen::Vector3f> viewpoints,
-                                   double cell, const RunControl& control = {});
+/// Per point: whether its normal points into the part, as its shell is clearly seen from the other side more. A shell
+/// that is seen from both sides or from none is judged like the whole mesh: a surface without a back, or an inner face,
+/// keeps its normals if the mesh at large does.
+///
+/// @param dense     the surface, spaced at most a third of `cell`.
+/// @param shell_of  per point: a number that the points of one shell share; their normals agree.
+/// Judged from fewer views when `control` interrupts.
+std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::span<const std::uint32_t> shell_of,
+                                   std::span<const Eigen::Vector3f> viewpoints, double cell,
+                                   const RunControl& control = {});
 
 }  // namespace binpose

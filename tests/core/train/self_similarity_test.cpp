@@ -74,6 +74,28 @@ TEST(SelfSimilarity, CallsAMarkedHexagonSimilarNotSymmetric) {
   EXPECT_LT(telling.size(), part.dense.size());
 }
 
+/// A round head with a hexagon so small that turns by up to 20 degrees leave it on itself to within the tolerance.
+Mesh screw_head() {
+  const Eigen::Vector2f head[] = {{0, -0.01F}, {0.02F, -0.01F}, {0.02F, 0.01F}, {0, 0.01F}};
+  std::vector<Eigen::Vector2f> hexagon;
+  for (int i = 0; i < 6; ++i) {
+    const float angle = static_cast<float>(60 * kDegree * i);
+    hexagon.emplace_back(0.0055F * std::cos(angle), 0.0055F * std::sin(angle));
+  }
+  return testing::joined(testing::revolve(head, 96),
+                         testing::shifted(testing::extrude(hexagon, 0.01F), {0, 0, 0.015F}));
+}
+
+TEST(SelfSimilarity, OfASmallHexagonIsItsSixTurnsNotWhatIsNearThem) {
+  const SelfSimilarity found = Part(screw_head()).search();
+  EXPECT_FALSE(found.symmetry.has_axis);
+  EXPECT_EQ(found.symmetry.discrete.size(), 6u);
+  for (const Pose& T : found.symmetry.discrete) {
+    const double angle = Eigen::AngleAxisd(T.linear()).angle();
+    EXPECT_LT(std::abs(std::remainder(angle, 60 * kDegree)), kDegree) << angle / kDegree;
+  }
+}
+
 TEST(SelfSimilarity, IsTheSameEveryTime) {
   const Part part(testing::hexagon());
   const SelfSimilarity once = part.search(), again = part.search();

@@ -71,17 +71,55 @@ TEST(Train, EachSelectionKeepsTheBestByItsOwnMeasure) {
   EXPECT_GT(distinct_mean(PairSelection::kSignalToNoise), distinct_mean(PairSelection::kObservability));
 }
 
-TEST(Train, RepairsFacesThatAreWoundTheWrongWay) {
-  Mesh mesh = testing::l_block();
-  for (std::size_t t = 0; t < mesh.triangles.size(); t += 2) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
-  const Model model = *train(mesh, quick(), {});
-  const Model expected = *train(testing::l_block(), quick(), {});
-  const auto mean_observability = [](const Model& m) {
-    double sum = 0;
-    for (const ViewMask& mask : m.visibility) sum += observability(mask, m.params.viewpoint_count);
-    return sum / static_cast<double>(m.visibility.size());
-  };
-  EXPECT_NEAR(mean_observability(model), mean_observability(expected), 0.02 * mean_observability(expected));
+/// The mesh with every n-th triangle wound the other way.
+Mesh with_turned(Mesh mesh, std::size_t n) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += n) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  return mesh;
+}
+
+/// A tube that is too narrow to look far into.
+Mesh tube() {
+  const Eigen::Vector2f profile[] = {
+      {0.003F, 0.05F}, {0.003F, -0.05F}, {0.015F, -0.05F}, {0.015F, 0.05F}, {0.003F, 0.05F}};
+  Mesh mesh = testing::revolve(profile, 32);
+  for (auto& triangle : mesh.triangles) {
+    for (std::uint32_t& corner : triangle) corner %= 4 * 32;  // the last ring is the first
+  }
+  return mesh;
+}
+
+double mean_observability(const Model& model) {
+  double sum = 0;
+  for (const ViewMask& mask : model.visibility) sum += observability(mask, model.params.viewpoint_count);
+  return sum / static_cast<double>(model.visibility.size());
+}
+
+TEST(Train, OrientsTheSurfaceHoweverItIsWound) {
+  for (const Mesh& mesh : {testing::l_block(), tube()}) {
+    const double expected = mean_observability(*train(mesh, quick(), {}));
+    for (const std::size_t n : {1, 2}) {
+      EXPECT_NEAR(mean_observability(*train(with_turned(mesh, n), quick(), {})), expected, 0.02 * expected);
+    }
+  }
+}
+
+TEST(Train, KeepsTheNormalsOfAThinPlateAndOfADeepBore) {
+  const Model plate = *train(testing::box({0.1F, 0.06F, 0.0005F}), quick(), {});
+  for (const SurfacePoint& p : plate.surface) EXPECT_GT(p.normal.dot(p.position), 0);
+  const Model bored = *train(with_turned(tube(), 1), quick(), {});
+  for (const SurfacePoint& p : bored.surface) {
+    if (std::abs(p.normal.z()) > 0.5F) continue;
+    EXPECT_EQ(p.normal.head<2>().dot(p.position.head<2>()) > 0, p.position.head<2>().norm() > 0.009F);
+  }
+}
+
+TEST(Train, WarnsOfWhatIsWrongWithTheMesh) {
+  EXPECT_THAT(train(testing::l_block(), quick(), {})->warnings, ::testing::IsEmpty());
+  EXPECT_THAT(train(with_turned(testing::l_block(), 1), quick(), {})->warnings,
+              ::testing::ElementsAre(::testing::HasSubstr("inside out")));
+  const Mesh crate = testing::box({0.1F, 0.1F, 0.1F});
+  EXPECT_THAT(train(testing::joined(crate, testing::box({0.05F, 0.05F, 0.05F})), quick(), {})->warnings,
+              ::testing::ElementsAre(::testing::HasSubstr("20 % of the mesh's surface can't be seen")));
 }
 
 TEST(Train, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {

@@ -96,13 +96,60 @@ TEST(Visibility, IsTheSameOnAnyNumberOfThreads) {
   }
 }
 
-TEST(SeenFromBehind, FindsTheNormalsThatPointInwards) {
-  std::vector<SurfacePoint> dense = scatter(testing::l_block(), 0.001);
-  for (std::size_t i = 0; i < dense.size(); i += 3) dense[i].normal = -dense[i].normal;
-  const std::vector<bool> behind = seen_from_behind(dense, view_directions(60), 0.003);
-  int wrong = 0;
-  for (std::size_t i = 0; i < dense.size(); ++i) wrong += static_cast<int>(behind[i] != (i % 3 == 0));
-  EXPECT_LT(wrong, 0.002 * static_cast<double>(dense.size()));
+/// Points of several bodies, a shell each.
+struct Bodies {
+  std::vector<SurfacePoint> dense;
+  std::vector<std::uint32_t> shell_of;
+
+  void add(const Mesh& mesh, bool turned) {
+    for (SurfacePoint point : scatter(mesh, 0.001)) {
+      if (turned) point.normal = -point.normal;
+      dense.push_back(point);
+      shell_of.push_back(count);
+    }
+    ++count;
+  }
+  /// Share of the points of a shell that are seen from behind.
+  double behind(std::uint32_t shell) const {
+    const std::vector<bool> all = seen_from_behind(dense, shell_of, view_directions(60), 0.003);
+    int points = 0, turned = 0;
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      if (shell_of[i] != shell) continue;
+      ++points;
+      turned += static_cast<int>(all[i]);
+    }
+    return static_cast<double>(turned) / points;
+  }
+  std::uint32_t count = 0;
+};
+
+TEST(SeenFromBehind, FindsTheShellsWhoseNormalsPointInwards) {
+  Bodies bodies;
+  bodies.add(testing::l_block(), false);
+  bodies.add(testing::shifted(testing::box({0.03F, 0.03F, 0.03F}), {0.15F, 0, 0}), true);
+  bodies.add(testing::shifted(testing::box({0.1F, 0.06F, 0.0005F}), {0, 0, 0.1F}), false);
+  bodies.add(testing::shifted(testing::box({0.1F, 0.06F, 0.0005F}), {0, 0, -0.1F}), true);
+  for (const std::uint32_t shell : {0, 1, 2, 3}) EXPECT_EQ(bodies.behind(shell), shell % 2) << shell;
+}
+
+TEST(SeenFromBehind, LeavesASheetAsItIs) {
+  Mesh sheet;
+  sheet.vertices = {{0, 0, 0}, {0.1F, 0, 0}, {0.1F, 0.05F, 0}, {0, 0.05F, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  for (const bool turned : {false, true}) {
+    Bodies bodies;
+    bodies.add(sheet, turned);
+    EXPECT_EQ(bodies.behind(0), 0);
+  }
+}
+
+TEST(SeenFromBehind, JudgesWhatNobodySeesLikeTheWholeMesh) {
+  for (const bool turned : {false, true}) {
+    Bodies bodies;
+    bodies.add(testing::box({0.1F, 0.1F, 0.1F}), turned);
+    bodies.add(testing::box({0.05F, 0.05F, 0.05F}), turned);
+    EXPECT_EQ(bodies.behind(1), turned);
+  }
 }
 
 }  // namespace
