@@ -38,7 +38,7 @@ struct Model {
   Symmetry symmetry;
   std::vector<Pose> similar_poses;           ///< T_model_model: turns by which most of the surface stays on itself
   std::vector<SurfacePoint> telling_points;  ///< those that such a turn takes off the surface; progressive
-  double telling_spacing = 0;                ///< distance of neighbouring telling points, metres
+  double telling_spacing = 0;                ///< its square is the surface that each telling point stands for, metres
   std::vector<ViewMask> telling_visibility;  ///< per telling point: the viewpoints that see it
   std::vector<std::string> warnings;         ///< what is odd about the mesh, one sentence each
 

@@ -10,7 +10,7 @@ namespace {
 /// another pose.
 constexpr float kOwnDepth = 0.08F;
 /// Log of the odds that one pixel adds to the variant that it fits; neighbouring pixels repeat each other.
-constexpr float kPixelWeight = 0.45F;
+constexpr float kPixelWeight = 0.28F;
 /// Rivals less likely than this against the choice are ruled out.
 constexpr float kRuledOut = 0.05F;
 

@@ -88,6 +88,21 @@ void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>
   }
 }
 
+/// The points that tell the model's similar poses apart, thinned to a number that detection can afford.
+/// @param dense_area  of the surface that each dense point stands for, square metres.
+void add_telling_points(const std::vector<SurfacePoint>& dense, double dense_area, const RunControl& control,
+                        Model& model) {
+  const std::vector<SurfacePoint> telling = telling_points(dense, model.similar_poses, model.diameter, control);
+  double spacing = kRelativeTellingSpacing * model.diameter;
+  do {
+    model.telling_points = thin_evenly(telling, spacing, control);
+    spacing *= 1.2;
+  } while (model.telling_points.size() > kMostTelling);
+  // By area, so that the evidence does not depend on how many steps of thinning it took.
+  const auto count = static_cast<double>(std::max<std::size_t>(1, model.telling_points.size()));
+  model.telling_spacing = std::sqrt(dense_area * static_cast<double>(telling.size()) / count);
+}
+
 }  // namespace
 
 absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const RunControl& control,
@@ -153,13 +168,7 @@ absl::StatusOr<Model> train(const Mesh& mesh, const TrainParams& params, const R
   SelfSimilarity self = find_self_similarity(dense, model.surface, model.diameter, control);
   model.symmetry = std::move(self.symmetry);
   model.similar_poses = std::move(self.similar);
-  const std::vector<SurfacePoint> telling = telling_points(dense, model.similar_poses, model.diameter, control);
-  model.telling_spacing = kRelativeTellingSpacing * model.diameter;
-  do {
-    model.telling_points = thin_evenly(telling, model.telling_spacing, control);
-    model.telling_spacing *= 1.2;
-  } while (model.telling_points.size() > kMostTelling);
-  model.telling_spacing /= 1.2;
+  add_telling_points(dense, extent.area / static_cast<double>(dense.size()), control, model);
   model.telling_visibility =
       visibility(dense, model.telling_points, viewpoints, kRelativeCell * model.diameter, control);
   if (absl::Status status = control.status(); !status.ok()) return status;

@@ -108,9 +108,9 @@ Trained train_all(const std::string& parts_folder, const std::string& only, cons
     std::printf("%-16s trained in %.2f s: %zu surface points, %zu pair points, %zu pairs\n", part.name.c_str(),
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->surface.size(),
                 model->pair_points.size(), model->pairs.size());
-    std::printf("%-16s symmetry: %zu turns%s; %zu similar poses, %zu telling points\n", "",
+    std::printf("%-16s symmetry: %zu turns%s; %zu similar poses, %zu telling points %.2f mm\n", "",
                 model->symmetry.discrete.size(), model->symmetry.has_axis ? " and an axis" : "",
-                model->similar_poses.size(), model->telling_points.size());
+                model->similar_poses.size(), model->telling_points.size(), 1000 * model->telling_spacing);
     trained.emplace(part.name, std::pair(*std::move(model), PoseJudge(part)));
   }
   return trained;

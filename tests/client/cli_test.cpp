@@ -210,6 +210,25 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   EXPECT_FALSE(request.params().remove_support_plane());
 }
 
+TEST_F(Cli, AParamsFileSaysWhatHasNoOptionAndOptionsOverrideIt) {
+  server_.answer = one_part;
+  const std::string params = file(
+      "cell.json", R"({"minScore": 0.7, "effort": "EFFORT_FAST", "regions": [{"size": {"x": 1, "y": 2, "z": 3}}]})");
+  const std::string detect = "detect --model gear --unit mm --params " + params;
+  ASSERT_EQ(run(detect + " --effort thorough --scene", {file("bin.pcd", "#")}).exit_code, 0);
+  const v1::DetectParams sent = server_.detect_requests().at(0).params();
+  EXPECT_EQ(sent.min_score(), 0.7);
+  EXPECT_EQ(sent.effort(), v1::EFFORT_THOROUGH);
+  ASSERT_EQ(sent.regions_size(), 1);
+  EXPECT_EQ(sent.regions(0).size().y(), 2);
+
+  const Output typo =
+      run("detect --model gear --unit mm --params " + file("typo.json", R"({"minScor": 1})") + " --scene",
+          {path("bin.pcd")});
+  EXPECT_EQ(typo.exit_code, 3);
+  EXPECT_THAT(typo.err, AllOf(HasSubstr("typo.json"), HasSubstr("minScor")));
+}
+
 TEST_F(Cli, ViewDrawsTheResultOfOneDetection) {
   if (run("detect --help").out.find("not in this build") != std::string::npos) GTEST_SKIP() << "built without viewer";
   server_.answer = [](const v1::DetectRequest& request) {
