@@ -78,8 +78,11 @@ class PythonTest(unittest.TestCase):
         self.assertEqual(best.covariance.shape, (6, 6))
         self.assertTrue((np.linalg.eigvalsh(best.covariance) > 0).all())
         self.assertEqual(best.free_directions.shape[1], 6)
+        box = self.client.model("part")
+        centre = [500 * (getattr(box.bounding_box_min, a) + getattr(box.bounding_box_max, a)) for a in "xyz"]  # mm
         region = service.OrientedBox()
-        region.pose.position.x, region.pose.position.y, region.pose.position.z = best.T_scene_model[:3, 3]
+        position = region.pose.position
+        position.x, position.y, position.z = (best.T_scene_model @ [*centre, 1])[:3]
         region.size.x = region.size.y = region.size.z = 40
         params = service.DetectParams(regions=[region], list_equivalents=True)
         found = self.client.detect("part", scan(), params=params).parts

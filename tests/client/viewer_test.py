@@ -132,8 +132,9 @@ class ViewerTest(unittest.TestCase):
         browser.draw(self.driver)
 
     def axes(self):
-        """Where the corner's three axes point."""
-        return [(line.get_attribute("x2"), line.get_attribute("y2")) for line in self.find("#axes line")]
+        """Where the corner's three axes point, to what an eye could tell."""
+        return [tuple(round(float(line.get_attribute(end)), 3) + 0.0 for end in ("x2", "y2"))
+                for line in self.find("#axes line")]
 
     def selected(self):
         """Rank of the selected part, or None."""
