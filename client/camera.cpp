@@ -10,7 +10,7 @@
 namespace binpose::client {
 namespace {
 
-constexpr double kMaxPixels = 65536;  // a row or column of any depth camera
+constexpr double kMaxSidePixels = 65536;  // a row or column of any depth camera
 
 /// Takes the numbers of a JSON object; the first fault is remembered.
 class Fields {
@@ -33,7 +33,7 @@ class Fields {
   }
 
   std::uint32_t count(const std::string& name) {
-    const double value = number(name, 1, kMaxPixels);
+    const double value = number(name, 1, kMaxSidePixels);
     if (std::floor(value) != value) fail("has " + name + " = " + std::to_string(value) + "; it must be a whole number");
     return static_cast<std::uint32_t>(value);
   }

@@ -26,7 +26,7 @@ RollPitchYaw roll_pitch_yaw(const v1::Quaternion& q) {
 
 double millimetres_per(v1::LengthUnit unit) { return unit == v1::LENGTH_UNIT_METRE ? 1000 : 1; }
 
-Table table_of(const v1::DetectResponse& answer, double millimetres_per_unit) {
+Table hypothesis_table(const v1::DetectResponse& answer, double millimetres_per_unit) {
   Table table = {
       {"rank", "model", "x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg", "score", "visible", "confidence"}};
   for (const v1::PoseHypothesis& part : answer.hypotheses()) {
@@ -64,7 +64,7 @@ void print_answer(const v1::DetectResponse& answer, const std::string& scene, v1
   if (stats.stop_reason() == v1::STOP_REASON_DEADLINE) std::cout << " (stopped early by the deadline)";
   if (stats.stop_reason() == v1::STOP_REASON_MAX_RESULTS) std::cout << " (the best of more)";
   std::cout << '\n';
-  if (count > 0) print(table_of(answer, millimetres_per(unit)), std::cout);
+  if (count > 0) print(hypothesis_table(answer, millimetres_per(unit)), std::cout);
   print_ambiguous(answer);
   for (const std::string& warning : answer.warnings()) print_warning(warning);
   std::cout << std::flush;

@@ -10,7 +10,6 @@
 namespace binpose {
 namespace {
 
-constexpr float kGrazingCosine = 0.17364818F;  // 80 degrees
 constexpr float kSteadyCosine = 0.5F;          // noise is judged on surfaces within 60 degrees
 constexpr int kFewestNeighbours = 4;           // besides the pixel itself, in a 3 x 3 window
 /// Depth step between neighbours, in pixel widths per pixel, beyond which they lie on different surfaces.

@@ -5,6 +5,9 @@
 
 namespace binpose {
 
+/// Surface seen under a smaller cosine (80 degrees off the ray) counts as not seen.
+constexpr float kGrazingCosine = 0.17364818F;
+
 /// Sets the normal of every measured pixel that has enough neighbours: the plane through its window, fitted as inverse
 /// depth over the image, where every plane is linear. Neighbours across a depth step are left out; pixels seen under
 /// more than 80 degrees get no normal. Also sets the map's noise, from the windows that are most nearly plane.

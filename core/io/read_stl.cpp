@@ -14,21 +14,21 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "binary STL is read by copying its numbers");
 
 // 80 bytes of free text, a 32-bit triangle count, then per triangle a normal, three vertices and 16 bits of attributes.
-constexpr std::size_t kHeaderBytes = 84;
+constexpr std::size_t kBinaryHeaderBytes = 84;
 constexpr std::size_t kTriangleBytes = 50;
 constexpr std::size_t kNormalBytes = 12;
 constexpr std::size_t kVertexBytes = 12;
 
-using Corners = std::array<Eigen::Vector3f, 3>;
+using Triangle = std::array<Eigen::Vector3f, 3>;
 
 std::uint32_t stated_triangle_count(std::string_view bytes) {
   std::uint32_t count = 0;
-  std::memcpy(&count, bytes.data() + kHeaderBytes - sizeof(count), sizeof(count));
+  std::memcpy(&count, bytes.data() + kBinaryHeaderBytes - sizeof(count), sizeof(count));
   return count;
 }
 
 std::size_t stated_size(std::string_view bytes) {
-  return kHeaderBytes + kTriangleBytes * std::size_t{stated_triangle_count(bytes)};
+  return kBinaryHeaderBytes + kTriangleBytes * std::size_t{stated_triangle_count(bytes)};
 }
 
 absl::Status too_many(std::size_t count, std::size_t max_triangles) {
@@ -36,7 +36,7 @@ absl::Status too_many(std::size_t count, std::size_t max_triangles) {
       absl::StrFormat("The STL file has %d triangles or more; the limit is %d.", count, max_triangles));
 }
 
-void append_triangle(const Corners& corners, PolygonMesh& mesh) {
+void append_triangle(const Triangle& corners, PolygonMesh& mesh) {
   mesh.corner_counts.push_back(3);
   for (const Eigen::Vector3f& vertex : corners) {
     mesh.corners.push_back(static_cast<std::uint32_t>(mesh.vertices.size()));
@@ -46,9 +46,9 @@ void append_triangle(const Corners& corners, PolygonMesh& mesh) {
 
 absl::StatusOr<PolygonMesh> read_binary_stl(std::string_view bytes, std::size_t max_triangles,
                                             const RunControl& control) {
-  if (bytes.size() < kHeaderBytes) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("The binary STL file has %d bytes; its header alone takes %d.", bytes.size(), kHeaderBytes));
+  if (bytes.size() < kBinaryHeaderBytes) {
+    return absl::InvalidArgumentError(absl::StrFormat("The binary STL file has %d bytes; its header alone takes %d.",
+                                                      bytes.size(), kBinaryHeaderBytes));
   }
   const std::size_t count = stated_triangle_count(bytes);
   if (stated_size(bytes) != bytes.size()) {
@@ -66,8 +66,8 @@ absl::StatusOr<PolygonMesh> read_binary_stl(std::string_view bytes, std::size_t 
   mesh.vertices.reserve(3 * count);
   for (std::size_t i = 0; i < count; ++i) {
     if (control.interrupted_at(i)) return control.status();
-    const char* triangle = bytes.data() + kHeaderBytes + i * kTriangleBytes + kNormalBytes;
-    Corners corners;
+    const char* triangle = bytes.data() + kBinaryHeaderBytes + i * kTriangleBytes + kNormalBytes;
+    Triangle corners;
     for (Eigen::Vector3f& vertex : corners) {
       std::memcpy(vertex.data(), triangle, kVertexBytes);
       triangle += kVertexBytes;
@@ -118,7 +118,7 @@ void read_facet(AsciiStl& stl, PolygonMesh& mesh) {
   for (int i = 0; i < 3; ++i) stl.next_word();  // many writers put nonsense here; the corners' order tells the normal
   stl.expect("outer");
   stl.expect("loop");
-  Corners corners;
+  Triangle corners;
   for (Eigen::Vector3f& vertex : corners) {
     stl.expect("vertex");
     for (float& coordinate : vertex) coordinate = stl.number();
@@ -153,12 +153,12 @@ absl::StatusOr<PolygonMesh> read_ascii_stl(std::string_view bytes, std::size_t m
 }  // namespace
 
 bool is_binary_stl(std::string_view bytes) {
-  return bytes.size() >= kHeaderBytes && stated_size(bytes) == bytes.size();
+  return bytes.size() >= kBinaryHeaderBytes && stated_size(bytes) == bytes.size();
 }
 
 absl::StatusOr<PolygonMesh> read_stl(std::string_view bytes, std::size_t max_triangles, const RunControl& control) {
   // The triangle count of any binary file of an admissible size has a zero byte; text has none.
-  const bool has_zero = bytes.substr(0, kHeaderBytes).find('\0') != std::string_view::npos;
+  const bool has_zero = bytes.substr(0, kBinaryHeaderBytes).find('\0') != std::string_view::npos;
   const bool is_text = equal_ignoring_case(TextCursor{bytes}.next_word(), "solid") && !has_zero;
   return is_text && !is_binary_stl(bytes) ? read_ascii_stl(bytes, max_triangles, control)
                                           : read_binary_stl(bytes, max_triangles, control);

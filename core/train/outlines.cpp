@@ -3,13 +3,13 @@
 #include <Eigen/Geometry>
 
 #include "core/geometry/contours.h"
+#include "core/geometry/normals.h"
 #include "core/parallel.h"
 
 namespace binpose {
 namespace {
 
 constexpr float kViewerDistance = 20;  // diameters: rays are parallel to 1.5 degrees
-constexpr float kGrazingCosine = 0.17364818F;
 
 /// View frame of a far viewer: z from the viewer to the part.
 Eigen::Isometry3f view_frame(const Eigen::Vector3f& viewpoint, float distance, const Eigen::Vector3f& centre) {

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "core/geometry/normals.h"
 #include "core/parallel.h"
 
 namespace binpose {
 namespace {
 
-constexpr float kGrazingCosine = 0.17364818F;  // 80 degrees off the view
 /// Votes for one side over votes for the other, from which on the sides are told apart.
 constexpr double kClearMajority = 1.25;
 
