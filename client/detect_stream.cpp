@@ -88,7 +88,7 @@ void DetectStream::run() {
     if (was_answered) failures = 0;
     if (!is_lost(status) || ++failures > retries_.attempts) return end(status);
     servers_->leave(server);
-    if (!pause(pause_before(failures, retries_))) return end(grpc::Status::CANCELLED);
+    if (!wait_before(failures)) return end(grpc::Status::CANCELLED);
   }
 }
 
@@ -162,10 +162,23 @@ void DetectStream::take(v1::DetectResponse answer, const Attempt& attempt) {
   changed_.notify_all();
 }
 
-/// False when the stream was cancelled meanwhile.
-bool DetectStream::pause(std::chrono::milliseconds duration) {
+/// Waits for the server to be connected, or as long as the pause; gRPC attends to a connection every five seconds only,
+/// unless somebody waits for it. False when the stream was cancelled meanwhile.
+bool DetectStream::wait_before(int attempt) {
+  using Clock = std::chrono::system_clock;
+  constexpr std::chrono::milliseconds kLongestWait(50);  // for a cancel to be noticed
+  grpc::Channel& channel = *servers_->current().channel;
+  const bool is_connected = channel.GetState(true) == GRPC_CHANNEL_READY;
+  const Clock::time_point end = Clock::now() + pause_before(attempt, retries_);
   std::unique_lock lock(mutex_);
-  return !changed_.wait_for(lock, duration, [this] { return is_cancelled_; });
+  if (is_connected) changed_.wait_until(lock, end, [this] { return is_cancelled_; });
+  while (!is_cancelled_ && Clock::now() < end) {
+    lock.unlock();
+    const bool is_connected_now = channel.WaitForConnected(std::min(end, Clock::now() + kLongestWait));
+    lock.lock();
+    if (is_connected_now) break;
+  }
+  return !is_cancelled_;
 }
 
 void DetectStream::end(const grpc::Status& status) {

@@ -78,7 +78,7 @@ class DetectStream {
   grpc::Status attempt(const Stubs& server, bool& was_answered);
   void send(Attempt& attempt);
   void take(v1::DetectResponse answer, const Attempt& attempt);
-  bool pause(std::chrono::milliseconds duration);
+  bool wait_before(int attempt);
   void end(const grpc::Status& status);
   absl::Status status() const;
 

@@ -89,7 +89,7 @@ std::chrono::milliseconds pause_before(int attempt, const Retries& retries) {
 Servers::Servers(const Connection& connection) : name_(connection.server) {
   for (const std::string& address : split(connection.server)) {
     const std::shared_ptr<grpc::Channel> channel = open_channel(address, connection);
-    stubs_.push_back({grpc::health::v1::Health::NewStub(channel), v1::ModelService::NewStub(channel),
+    stubs_.push_back({channel, grpc::health::v1::Health::NewStub(channel), v1::ModelService::NewStub(channel),
                       v1::DetectionService::NewStub(channel)});
   }
 }

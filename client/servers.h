@@ -1,5 +1,7 @@
 #pragma once
 
+#include <grpcpp/grpcpp.h>
+
 #include <atomic>
 #include <memory>
 #include <string>
@@ -14,6 +16,7 @@ namespace binpose::client {
 
 /// The stubs of one server, or of the balancer before several.
 struct Stubs {
+  std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<grpc::health::v1::Health::Stub> health;
   std::unique_ptr<v1::ModelService::Stub> models;
   std::unique_ptr<v1::DetectionService::Stub> detection;

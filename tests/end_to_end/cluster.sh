@@ -18,7 +18,7 @@ if command -v ip >/dev/null && private sh -c 'mkdir -p /run/netns && mount -t tm
   # Namespaces within namespaces: all goes when the test ends, however it does.
   export BINPOSE_CLUSTER_HOSTS=namespaces
   # shellcheck disable=SC2016  # for the inner shell
-  private sh -c 'mount -t tmpfs tmpfs /run/netns && ip link set lo up && exec /usr/bin/python3 "$1"' sh "$test"
+  private sh -c 'mount -t tmpfs tmpfs /run/netns && ip link set lo up && exec /usr/bin/python3 "$@"' sh "$test" ${BINPOSE_CLUSTER_TESTS:-}
 else
   echo "No network namespaces can be made here: each host is an address on loopback."
   BINPOSE_CLUSTER_HOSTS=loopback exec /usr/bin/python3 "$test"

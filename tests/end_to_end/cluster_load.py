@@ -88,7 +88,7 @@ class Streamer(Caller):
                         self.faults.append(f"scan {number}: {result}")
                     self.note_answer()
         except Exception as error:
-            self.faults.append(repr(error))
+            self.faults.append(f"{error!r} {time.monotonic() - self._last:.1f} s after the last answer")
 
 
 class PlainCaller(Caller):
@@ -105,6 +105,7 @@ class PlainCaller(Caller):
                 self.note_answer()
             except grpc.RpcError as error:
                 self.faults.append(f"{error.code().name}: {error.details()}")
+                api = wire.Api(self.target)
             time.sleep(PAUSE)
 
 

@@ -48,6 +48,20 @@ def is_lost(error):
     return error.code() == grpc.StatusCode.UNAVAILABLE or is_reset
 
 
+def wait_for(channel, seconds):
+    """Waits for a connection, at most so long; gRPC attends to one every five seconds only, unless somebody waits."""
+    start = time.monotonic()
+    ready = grpc.channel_ready_future(channel)
+    try:
+        ready.result(timeout=seconds)
+        if time.monotonic() - start < FIRST_PAUSE / 2:  # it was connected: the server did not take the call
+            time.sleep(seconds)
+    except grpc.FutureTimeoutError:
+        pass
+    finally:
+        ready.cancel()
+
+
 def answers(servers, source, *, model_id, timeout, retries):
     """Yields the answer to each scan of `source`, in order. A stream that is lost is opened again, with the next server,
     and what was not answered is sent again, up to `retries` times in a row and not beyond `timeout` seconds in all."""
@@ -71,6 +85,6 @@ def answers(servers, source, *, model_id, timeout, retries):
             if not is_lost(error) or failures > retries or (end is not None and time.monotonic() + pause > end):
                 raise
             servers.leave(server)
-            time.sleep(pause)
+            wait_for(servers.current().channel, pause)
         finally:
             call.cancel()  # where the caller takes no more answers
