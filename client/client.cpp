@@ -26,13 +26,15 @@ Client::Client(const Connection& connection, Timeouts timeouts, Retries retries)
     : servers_(std::make_shared<Servers>(connection)), timeouts_(timeouts), retries_(retries) {}
 
 template <class Call>
-absl::Status Client::call(const std::string& what, std::chrono::milliseconds timeout, Call call) {
+absl::Status Client::call(const std::string& what, const std::string& model_id, std::chrono::milliseconds timeout,
+                          Call call) {
   const auto deadline = std::chrono::system_clock::now() + timeout;
   grpc::Status status;
   for (std::size_t tried = 0; tried < (retries_.attempts > 0 ? servers_->count() : 1); ++tried) {
     const Stubs& server = servers_->current();
     grpc::ClientContext context;
     context.set_deadline(deadline);
+    set_routing_key(model_id, context);
     status = call(server, context);
     if (status.error_code() != grpc::StatusCode::UNAVAILABLE) break;
     servers_->leave(server);
@@ -43,7 +45,7 @@ absl::Status Client::call(const std::string& what, std::chrono::milliseconds tim
 absl::Status Client::check_health() {
   grpc::health::v1::HealthCheckResponse response;
   absl::Status status =
-      call("Asking for health", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
+      call("Asking for health", "", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
         return server.health->Check(&context, grpc::health::v1::HealthCheckRequest(), &response);
       });
   if (!status.ok() || response.status() == grpc::health::v1::HealthCheckResponse::SERVING) return status;
@@ -54,15 +56,16 @@ absl::Status Client::check_health() {
 absl::StatusOr<v1::Model> Client::train(const v1::TrainRequest& request, const TrainObserver& observer) {
   const std::string what = "Training model \"" + request.id() + "\"";
   std::optional<v1::Model> model;
-  absl::Status status = call(what, timeouts_.training, [&](const Stubs& server, grpc::ClientContext& context) {
-    const auto stream = server.models->Train(&context, request);
-    v1::TrainResponse progress;
-    while (stream->Read(&progress)) {
-      if (observer) observer(progress);
-      if (progress.has_model()) model = progress.model();
-    }
-    return stream->Finish();
-  });
+  absl::Status status =
+      call(what, request.id(), timeouts_.training, [&](const Stubs& server, grpc::ClientContext& context) {
+        const auto stream = server.models->Train(&context, request);
+        v1::TrainResponse progress;
+        while (stream->Read(&progress)) {
+          if (observer) observer(progress);
+          if (progress.has_model()) model = progress.model();
+        }
+        return stream->Finish();
+      });
   if (!status.ok()) return status;
   if (!model) return absl::InternalError(what + " failed: the server at " + servers_->name() + " sent no model.");
   return *std::move(model);
@@ -73,7 +76,7 @@ absl::StatusOr<v1::Model> Client::get_model(const std::string& id) {
   request.set_id(id);
   v1::Model model;
   absl::Status status =
-      call("Reading model \"" + id + "\"", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
+      call("Reading model \"" + id + "\"", id, timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
         return server.models->GetModel(&context, request, &model);
       });
   if (!status.ok()) return status;
@@ -84,7 +87,7 @@ absl::StatusOr<v1::GetModelShapeResponse> Client::get_model_shape(const std::str
   v1::GetModelShapeRequest request;
   request.set_id(id);
   v1::GetModelShapeResponse shape;
-  absl::Status status = call("Reading the shape of model \"" + id + "\"", timeouts_.call,
+  absl::Status status = call("Reading the shape of model \"" + id + "\"", id, timeouts_.call,
                              [&](const Stubs& server, grpc::ClientContext& context) {
                                return server.models->GetModelShape(&context, request, &shape);
                              });
@@ -95,7 +98,7 @@ absl::StatusOr<v1::GetModelShapeResponse> Client::get_model_shape(const std::str
 absl::StatusOr<v1::ListModelsResponse> Client::list_models() {
   v1::ListModelsResponse models;
   absl::Status status =
-      call("Listing the models", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
+      call("Listing the models", "", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
         return server.models->ListModels(&context, v1::ListModelsRequest(), &models);
       });
   if (!status.ok()) return status;
@@ -106,35 +109,36 @@ absl::Status Client::delete_model(const std::string& id) {
   v1::DeleteModelRequest request;
   request.set_id(id);
   v1::DeleteModelResponse response;
-  return call("Deleting model \"" + id + "\"", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
-    return server.models->DeleteModel(&context, request, &response);
-  });
+  return call("Deleting model \"" + id + "\"", id, timeouts_.call,
+              [&](const Stubs& server, grpc::ClientContext& context) {
+                return server.models->DeleteModel(&context, request, &response);
+              });
 }
 
 absl::StatusOr<std::string> Client::export_model(const std::string& id) {
   v1::ExportModelRequest request;
   request.set_id(id);
   std::string bytes;
-  absl::Status status =
-      call("Exporting model \"" + id + "\"", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
-        const auto stream = server.models->ExportModel(&context, request);
-        bytes.clear();
-        v1::ExportModelResponse part;
-        while (stream->Read(&part)) bytes += part.data();
-        return stream->Finish();
-      });
+  absl::Status status = call("Exporting model \"" + id + "\"", id, timeouts_.call,
+                             [&](const Stubs& server, grpc::ClientContext& context) {
+                               const auto stream = server.models->ExportModel(&context, request);
+                               bytes.clear();
+                               v1::ExportModelResponse part;
+                               while (stream->Read(&part)) bytes += part.data();
+                               return stream->Finish();
+                             });
   if (!status.ok()) return status;
   return bytes;
 }
 
 absl::StatusOr<v1::Model> Client::import_model(const std::string& id, const std::string& bytes) {
   v1::ImportModelResponse response;
-  absl::Status status =
-      call("Importing model \"" + id + "\"", timeouts_.call, [&](const Stubs& server, grpc::ClientContext& context) {
-        const auto stream = server.models->ImportModel(&context, &response);
-        send_pieces(id, bytes, *stream);
-        return stream->Finish();
-      });
+  absl::Status status = call("Importing model \"" + id + "\"", id, timeouts_.call,
+                             [&](const Stubs& server, grpc::ClientContext& context) {
+                               const auto stream = server.models->ImportModel(&context, &response);
+                               send_pieces(id, bytes, *stream);
+                               return stream->Finish();
+                             });
   if (!status.ok()) return status;
   return response.model();
 }

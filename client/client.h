@@ -53,7 +53,7 @@ class Client {
 
  private:
   template <class Call>
-  absl::Status call(const std::string& what, std::chrono::milliseconds timeout, Call call);
+  absl::Status call(const std::string& what, const std::string& model_id, std::chrono::milliseconds timeout, Call call);
 
   std::shared_ptr<Servers> servers_;
   Timeouts timeouts_;

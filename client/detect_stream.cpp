@@ -6,17 +6,6 @@
 #include "client/call_error.h"
 
 namespace binpose::client {
-namespace {
-
-/// What a balancer chooses the server by; empty for what cannot be a header.
-std::string routing_key(const v1::DetectRequest& request) {
-  const std::string id = request.model_ids().empty() ? "" : request.model_ids(0);
-  const auto is_printable = [](char c) { return c > ' ' && c <= '~'; };
-  return std::all_of(id.begin(), id.end(), is_printable) ? id : "";
-}
-
-}  // namespace
-
 DetectStream::DetectStream(std::shared_ptr<Servers> servers, std::chrono::milliseconds answer_timeout,
                            const Retries& retries)
     : servers_(std::move(servers)), answer_timeout_(answer_timeout), retries_(retries), runner_([this] { run(); }) {}
@@ -107,9 +96,8 @@ grpc::Status DetectStream::attempt(const Stubs& server, bool& was_answered) {
   Attempt attempt;
   {
     const std::lock_guard lock(mutex_);
-    if (const std::string key = routing_key(*unanswered_.front()); !key.empty()) {
-      attempt.context.AddMetadata("x-model-id", key);
-    }
+    const v1::DetectRequest& first = *unanswered_.front();
+    if (!first.model_ids().empty()) set_routing_key(first.model_ids(0), attempt.context);
     attempt.next = answered_;
     attempt_ = &attempt;
     if (is_cancelled_) attempt.context.TryCancel();

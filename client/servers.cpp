@@ -99,6 +99,12 @@ void Servers::leave(const Stubs& lost) {
   index_.compare_exchange_strong(index, (index + 1) % stubs_.size());
 }
 
+void set_routing_key(const std::string& model_id, grpc::ClientContext& context) {
+  const auto is_printable = [](char c) { return c > ' ' && c <= '~'; };
+  if (model_id.empty() || !std::all_of(model_id.begin(), model_id.end(), is_printable)) return;
+  context.AddMetadata("x-model-id", model_id);
+}
+
 bool is_lost(const grpc::Status& status) {
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return true;
   // What a balancer makes of a server that went away during a call. RST_STREAM 11 is the server's own "too much".

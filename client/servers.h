@@ -41,6 +41,10 @@ class Servers {
   std::atomic<std::size_t> index_ = 0;
 };
 
+/// Tells a balancer which model a call is about, so that all calls about it go to one server: what one call did is seen
+/// by the next. An ID that cannot be a header is left out.
+void set_routing_key(const std::string& model_id, grpc::ClientContext& context);
+
 /// Whether a call ended because its server did, or the way to it, rather than because of what was asked.
 bool is_lost(const grpc::Status& status);
 

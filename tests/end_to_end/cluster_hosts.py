@@ -47,6 +47,21 @@ def ip(*arguments):
     subprocess.run(["ip", *arguments], check=True)
 
 
+def make_certificates(folder, **addresses):
+    """ca.pem and, for each name, NAME.key and NAME.pem, the chain with the key."""
+    folder.mkdir(exist_ok=True)
+    openssl = lambda *arguments: subprocess.run(["openssl", *arguments], cwd=folder, check=True, capture_output=True)
+    openssl("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=test", "-keyout", "ca.key", "-out",
+            "ca.pem")
+    for name, address in addresses.items():
+        openssl("req", "-newkey", "rsa:2048", "-nodes", "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", "csr")
+        (folder / "extensions").write_text(f"subjectAltName=IP:{address}\n")
+        openssl("x509", "-req", "-in", "csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-days", "2",
+                "-extfile", "extensions", "-out", f"{name}.pem")
+        with (folder / f"{name}.pem").open("a") as chain:
+            chain.write((folder / f"{name}.key").read_text())
+
+
 class Host:
     """An address, with a network stack of its own where that can be had."""
 

@@ -95,7 +95,7 @@ class Client:
 
         def train(server):
             model = None
-            for progress in server.models.Train(request, timeout=timeout):
+            for progress in server.models.Train(request, timeout=timeout, metadata=stream.routing(model_id)):
                 if on_progress:
                     on_progress(model_service_pb2.TrainStage.Name(progress.stage), progress.progress)
                 if progress.HasField("model"):
@@ -114,11 +114,12 @@ class Client:
 
     def model(self, model_id):
         request = model_service_pb2.GetModelRequest(id=model_id)
-        return self._call(lambda server: server.models.GetModel(request, timeout=self._timeout))
+        return self._call(lambda server: server.models.GetModel(request, timeout=self._timeout,
+                                                                 metadata=stream.routing(model_id)))
 
     def delete(self, model_id):
         request = model_service_pb2.DeleteModelRequest(id=model_id)
-        self._call(lambda server: server.models.DeleteModel(request, timeout=self._timeout))
+        self._call(lambda server: server.models.DeleteModel(request, timeout=self._timeout, metadata=stream.routing(model_id)))
 
     def detect(self, models, scan, *, params=None, time_budget=None, timeout=60):
         """Finds parts in one scan. models -- an ID, or several; params -- binpose.v1.DetectParams; time_budget -- seconds

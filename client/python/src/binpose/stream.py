@@ -41,6 +41,11 @@ class Scans:
             self._answered += 1
 
 
+def routing(model_id):
+    """Headers that tell a balancer which model a call is about, so that all calls about it go to one server."""
+    return [("x-model-id", model_id)] if model_id and model_id.isascii() and model_id.isprintable() else []
+
+
 def is_lost(error):
     """Whether a call ended because its server did, or the way to it, rather than because of what was asked."""
     details = error.details() or ""
@@ -67,12 +72,11 @@ def answers(servers, source, *, model_id, timeout, retries):
     and what was not answered is sent again, up to `retries` times in a row and not beyond `timeout` seconds in all."""
     end = None if timeout is None else time.monotonic() + timeout
     scans = Scans(source)
-    metadata = [("x-model-id", model_id)] if model_id.isascii() and model_id.isprintable() and model_id else []
     failures = 0
     while True:
         server = servers.current()
         left = None if end is None else max(0, end - time.monotonic())
-        call = server.detection.Detect(scans.from_first_unanswered(), timeout=left, metadata=metadata)
+        call = server.detection.Detect(scans.from_first_unanswered(), timeout=left, metadata=routing(model_id))
         try:
             for answer in call:
                 failures = 0
