@@ -107,11 +107,14 @@ void set_routing_key(const std::string& model_id, grpc::ClientContext& context) 
 
 bool is_lost(const grpc::Status& status) {
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return true;
-  // What a balancer makes of a server that went away during a call. RST_STREAM 11 is the server's own "too much".
+  // What gRPC says of the ways in which a balancer passes on that a server went away. RST_STREAM 11 is the server's own
+  // "too much".
   const std::string& text = status.error_message();
-  const bool is_reset =
-      text.find("RST_STREAM") != std::string::npos || text.find("Stream removed") != std::string::npos;
-  return is_reset && text.find("error code 11") == std::string::npos;
+  if (text.find("error code 11") != std::string::npos) return false;
+  for (const char* sign : {"RST_STREAM", "Stream removed", "No status received"}) {
+    if (text.find(sign) != std::string::npos) return true;
+  }
+  return false;
 }
 
 }  // namespace binpose::client

@@ -112,6 +112,16 @@ TEST(DetectStream, AStreamThatItsServerEndsToBeReplacedIsOpenedAgainAndEveryFram
   EXPECT_GE(server.stream_count(), 7);
 }
 
+TEST(DetectStream, WhatABalancerMakesOfALostServerIsALossAndWhatTheServerSaysIsNot) {
+  using grpc::StatusCode;
+  EXPECT_TRUE(is_lost({StatusCode::INTERNAL, "Received RST_STREAM with error code 2"}));
+  EXPECT_TRUE(is_lost({StatusCode::UNKNOWN, "No status received"}));
+  EXPECT_TRUE(is_lost({StatusCode::UNKNOWN, "Stream removed"}));
+  EXPECT_FALSE(is_lost({StatusCode::RESOURCE_EXHAUSTED, "Received RST_STREAM with error code 11"}));
+  EXPECT_FALSE(is_lost({StatusCode::INTERNAL, "The server failed."}));
+  EXPECT_FALSE(is_lost(grpc::Status::OK));
+}
+
 TEST(DetectStream, AFrameThatBreaksEveryStreamIsGivenUpAfterTheAttempts) {
   FakeServer server;
   server.answers_before_end = 0;

@@ -7,8 +7,8 @@ import contextlib
 import hashlib
 import os
 import statistics
-import subprocess
 import struct
+import subprocess
 import tempfile
 import threading
 import time
@@ -139,7 +139,7 @@ class ClusterTest(unittest.TestCase):
         with self.load(plain_faults_allowed=True):
             victim = self.busiest()
             victim.pull_the_plug()
-            wait_for(lambda: victim.name not in [n for n in NAMES if balancer.serves_with(n)], what="that it is noticed")
+            wait_for(lambda: not balancer.servers()[victim.name]["status"].startswith("UP"), what="that it is noticed")
             time.sleep(20)
             victim.put_the_plug_back()
             wait_for(lambda: balancer.serves_with(*NAMES), what="that all servers are up")

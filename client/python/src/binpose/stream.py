@@ -48,9 +48,13 @@ def routing(model_id):
 
 def is_lost(error):
     """Whether a call ended because its server did, or the way to it, rather than because of what was asked."""
+    if error.code() == grpc.StatusCode.UNAVAILABLE:
+        return True
+    # What gRPC says of the ways in which a balancer passes on that a server went away. RST_STREAM 11 is the server's own
+    # "too much".
     details = error.details() or ""
-    is_reset = ("RST_STREAM" in details or "Stream removed" in details) and "error code 11" not in details
-    return error.code() == grpc.StatusCode.UNAVAILABLE or is_reset
+    signs = ("RST_STREAM", "Stream removed", "No status received")
+    return "error code 11" not in details and any(sign in details for sign in signs)
 
 
 def wait_for(channel, seconds):
