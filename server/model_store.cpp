@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <optional>
+#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -142,8 +143,9 @@ double ModelStore::directory_age() const { return seconds_since(last_look_); }
 ModelStore::Look ModelStore::look_for(const std::string& id, const Generations& generations) const {
   Look look;
   const auto current = places_.find(id);
-  for (auto it = generations.rbegin(); it != generations.rend(); ++it) {
-    const auto& [generation, file] = *it;
+  for (const auto& entry : std::views::reverse(generations)) {
+    const std::uint32_t generation = entry.first;
+    const ModelFile& file = entry.second;
     if (file.is_tombstone) {
       look.is_gone = true;
       return look;

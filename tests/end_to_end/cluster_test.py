@@ -7,7 +7,6 @@ import contextlib
 import hashlib
 import os
 import statistics
-import struct
 import subprocess
 import tempfile
 import threading
