@@ -224,8 +224,9 @@ TEST_F(ModelStoreTest, TrainingsOfOneIdOnThreeServersAtOnceGiveOneGenerationEach
     std::vector<std::jthread> threads;
     for (int s = 0; s < kServers; ++s) {
       threads.emplace_back([&, s] {
-        for (int i = 0; i < kTrainings; ++i)
+        for (int i = 0; i < kTrainings; ++i) {
           generations[s].push_back(stores[s]->put("block", block()).value()->generation);
+        }
       });
     }
   }
