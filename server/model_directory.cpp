@@ -60,9 +60,50 @@ std::optional<ModelFile> look_at(const std::filesystem::path& path) {
   return ModelFile{is_tombstone, info.st_ino, info.st_size, info.st_mtim.tv_sec * 1'000'000'000 + info.st_mtim.tv_nsec};
 }
 
+/// May miss a generation that comes and the one before, which goes, while it reads.
+absl::StatusOr<DirectoryContent> read_directory(const std::filesystem::path& directory) {
+  DirectoryContent content;
+  bool has_sign = false;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename();
+    has_sign = has_sign || name == kSign;
+    const bool is_being_written = name.starts_with('.') && !name.ends_with(kModelSuffix);
+    if (is_being_written) continue;
+    const std::optional<ModelFile> file = look_at(entry->path());
+    if (!file) continue;
+    std::error_code ignored;
+    if (const auto parsed = parse_name(name)) {
+      content.models[parsed->first].emplace(parsed->second, *file);
+    } else if (!entry->is_directory(ignored)) {
+      content.others.emplace(name, *file);
+    }
+  }
+  if (error) {
+    return absl::UnavailableError(
+        absl::StrFormat("Cannot read the model directory %s: %s.", directory.string(), error.message()));
+  }
+  if (!has_sign) {
+    return absl::UnavailableError(absl::StrFormat(
+        "%s is no model directory, because it lacks the file %s; is the share mounted?", directory.string(), kSign));
+  }
+  return content;
+}
+
 Generations generations_of(const DirectoryContent& content, const std::string& id) {
   const auto found = content.models.find(id);
   return found == content.models.end() ? Generations() : found->second;
+}
+
+/// Whether a generation that was just published follows on those in `known`. Its name may have been free because that
+/// generation was there before and is pruned already. Then newer ones are there; and since the oldest go first, what
+/// was known is gone as well: another file of its name is one that another slow server has not withdrawn yet.
+bool follows(const Generations& known, std::uint32_t generation, const Generations& now) {
+  const bool is_newest = now.empty() || now.rbegin()->first <= generation;
+  if (is_newest || known.empty()) return is_newest;
+  const auto before = now.find(known.rbegin()->first);
+  return before != now.end() && before->second == known.rbegin()->second && now.contains(generation + 1);
 }
 
 }  // namespace
@@ -96,31 +137,13 @@ absl::Status make_model_directory(const std::filesystem::path& directory) {
 }
 
 absl::StatusOr<DirectoryContent> list_model_directory(const std::filesystem::path& directory) {
-  DirectoryContent content;
-  bool has_sign = false;
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename();
-    has_sign = has_sign || name == kSign;
-    const bool is_being_written = name.starts_with('.') && !name.ends_with(kModelSuffix);
-    if (is_being_written) continue;
-    const std::optional<ModelFile> file = look_at(entry->path());
-    if (!file) continue;
-    std::error_code ignored;
-    if (const auto parsed = parse_name(name)) {
-      content.models[parsed->first].emplace(parsed->second, *file);
-    } else if (!entry->is_directory(ignored)) {
-      content.others.emplace(name, *file);
-    }
-  }
-  if (error) {
-    return absl::UnavailableError(
-        absl::StrFormat("Cannot read the model directory %s: %s.", directory.string(), error.message()));
-  }
-  if (!has_sign) {
-    return absl::UnavailableError(absl::StrFormat(
-        "%s is no model directory, because it lacks the file %s; is the share mounted?", directory.string(), kSign));
+  constexpr int kMaxTries = 10;
+  absl::StatusOr<DirectoryContent> content = read_directory(directory);
+  for (int i = 0; i < kMaxTries && content.ok(); ++i) {
+    absl::StatusOr<DirectoryContent> again = read_directory(directory);
+    const bool is_settled = again.ok() && again->models == content->models;
+    content = std::move(again);
+    if (is_settled) break;
   }
   return content;
 }
@@ -133,13 +156,9 @@ absl::StatusOr<ModelFile> publish(const std::filesystem::path& directory, const 
   if (absl::IsAlreadyExists(created)) return absl::AbortedError(created.message());
   if (!created.ok()) return created;
 
-  // The name may have been free because that generation was there and is pruned already. Then what was known before is
-  // gone as well, since the oldest go first, while newer ones are there.
   const absl::StatusOr<DirectoryContent> content = list_model_directory(directory);
   if (!content.ok()) return content.status();
-  const Generations now = generations_of(*content, id);
-  const bool is_newest = now.empty() || now.rbegin()->first <= generation;
-  if (!is_newest && (known.empty() || !now.contains(known.rbegin()->first))) {
+  if (!follows(known, generation, generations_of(*content, id))) {
     ::unlink((directory / name).c_str());
     return absl::AbortedError(absl::StrFormat("Newer generations of '%s' than %d are there.", id, generation));
   }

@@ -45,6 +45,7 @@ std::filesystem::path model_path(const std::filesystem::path& directory, std::st
 /// Makes a model directory, or takes the one that is there. Errors: INTERNAL.
 absl::Status make_model_directory(const std::filesystem::path& directory);
 
+/// What two readings in a row agree on, since one that others write to meanwhile may see neither of two generations.
 /// Errors: UNAVAILABLE, when it cannot be read or is not the model directory, but for example the empty folder that a
 /// share was mounted on.
 absl::StatusOr<DirectoryContent> list_model_directory(const std::filesystem::path& directory);

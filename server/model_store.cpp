@@ -243,7 +243,8 @@ std::size_t ModelStore::size() const {
 std::uint32_t ModelStore::next_generation(const std::string& id, const Generations& known) const {
   const std::uint32_t newest = known.empty() ? 0 : known.rbegin()->first;
   const auto served = find(id);  // of an unnumbered file, only its content tells the generation
-  return 1 + std::max(newest, served.ok() ? (*served)->generation : 0);
+  const auto put = put_.find(id);
+  return 1 + std::max({newest, served.ok() ? (*served)->generation : 0, put != put_.end() ? put->second : 0});
 }
 
 absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::string& id, Model model) {
@@ -264,6 +265,7 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::st
     const absl::StatusOr<ModelFile> file = publish(directory_, id, stored->generation, bytes, *known);
     if (file.ok()) {
       places_[id] = {stored->generation, *file};
+      put_[id] = stored->generation;
       serve(stored);
       prune(directory_, id, limits_.keep_generations);
       return stored;

@@ -100,11 +100,12 @@ class ModelStore {
   std::atomic<std::size_t> skipped_files_ = 0;
   std::atomic<Clock::time_point> last_look_ = Clock::now();  ///< when the directory was last read
   std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change; before mutex_
-  std::map<std::string, Generations, std::less<>> seen_;  ///< that were dealt with
-  std::map<std::string, Place, std::less<>> places_;      ///< of the models that are served
-  std::map<std::string, ModelFile> skipped_;              ///< files that were logged already, by path
-  bool is_away_ = false;                                  ///< the directory
-  mutable std::mutex mutex_;                              ///< guards models_
+  std::map<std::string, Generations, std::less<>> seen_;   ///< that were dealt with
+  std::map<std::string, std::uint32_t, std::less<>> put_;  ///< generations that this server put last
+  std::map<std::string, Place, std::less<>> places_;       ///< of the models that are served
+  std::map<std::string, ModelFile> skipped_;               ///< files that were logged already, by path
+  bool is_away_ = false;                                   ///< the directory
+  mutable std::mutex mutex_;                               ///< guards models_
   std::map<std::string, std::shared_ptr<const StoredModel>, std::less<>> models_;
   std::jthread watcher_;  ///< last, so that it ends before the rest goes
 };
