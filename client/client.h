@@ -1,50 +1,35 @@
 #pragma once
 
-#include <grpcpp/grpcpp.h>
-
 #include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "binpose/v1/detection_service.grpc.pb.h"
 #include "binpose/v1/model_service.grpc.pb.h"
+#include "client/connection.h"
 #include "client/detect_stream.h"
-#include "grpc/health/v1/health.grpc.pb.h"
+#include "client/servers.h"
 
 namespace binpose::client {
-
-/// How long to wait for a server.
-struct Timeouts {
-  std::chrono::milliseconds call = std::chrono::seconds(10);      ///< a short call: to get, list or delete models
-  std::chrono::milliseconds training = std::chrono::minutes(10);  ///< a whole training
-  std::chrono::milliseconds answer = std::chrono::minutes(1);     ///< the next answer on a stream of frames
-};
-
-/// How to reach a server.
-struct Connection {
-  std::string server;         ///< HOST:PORT
-  std::string tls_ca = {};    ///< PEM text of the authorities that vouch for the server; empty = plaintext
-  std::string tls_cert = {};  ///< PEM text of the certificate that the server asks for; empty = none
-  std::string tls_key = {};   ///< PEM text of its key
-  std::string token = {};     ///< bearer token; empty = none. In plaintext everybody on the way can read it.
-};
 
 /// Told what a training does; see TrainResponse.
 using TrainObserver = std::function<void(const v1::TrainResponse& progress)>;
 
 /// A connection to a binpose server. Thread-safe; make one and keep it.
 ///
+/// Where a connection names several servers, a call goes to the next when one cannot be reached: so a training whose
+/// server was lost may give two generations, and a deletion may find its model deleted.
+///
 /// Every error is a sentence that says what failed, where, and what to do next; its code is that of the gRPC call.
 class Client {
  public:
   /// Connects with the first call, and again when the connection is lost.
-  explicit Client(const Connection& connection, Timeouts timeouts = {});
-  /// `server`: HOST:PORT, plaintext.
-  explicit Client(const std::string& server, Timeouts timeouts = {}) : Client(Connection{.server = server}, timeouts) {}
+  explicit Client(const Connection& connection, Timeouts timeouts = {}, Retries retries = {});
+  /// `server`: as in Connection; plaintext.
+  explicit Client(const std::string& server, Timeouts timeouts = {}, Retries retries = {})
+      : Client(Connection{.server = server}, timeouts, retries) {}
 
   /// OK when the server takes calls; UNAVAILABLE when it does not, for example because it is about to end.
   absl::Status check_health();
@@ -67,12 +52,12 @@ class Client {
   std::unique_ptr<DetectStream> open_detect_stream();
 
  private:
-  std::string server_;
+  template <class Call>
+  absl::Status call(const std::string& what, const std::string& model_id, std::chrono::milliseconds timeout, Call call);
+
+  std::shared_ptr<Servers> servers_;
   Timeouts timeouts_;
-  std::shared_ptr<grpc::Channel> channel_;
-  std::unique_ptr<grpc::health::v1::Health::Stub> health_;
-  std::unique_ptr<v1::ModelService::Stub> models_;
-  std::unique_ptr<v1::DetectionService::Stub> detection_;
+  Retries retries_;
 };
 
 }  // namespace binpose::client

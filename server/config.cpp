@@ -51,7 +51,13 @@ void add_limit_options(CLI::App& app, Config& config) {
       ->check(CLI::Range(1, 1'000'000));
   app.add_option("--models-memory-mib", config.models_memory_mib, "Model files that are served in all, MiB")
       ->check(CLI::Range(1, 1'000'000));
-  app.add_option("--drain-timeout", config.drain_timeout_seconds, "Seconds that calls may go on after SIGTERM")
+  app.add_option("--keep-generations", config.keep_generations,
+                 "Generations of a model that stay in the directory, the one that is served included")
+      ->check(CLI::Range(1, 1'000'000));
+  app.add_option("--drain-delay", config.drain_delay_seconds,
+                 "Seconds after SIGTERM in which calls are still taken, while /readyz and health say no to a balancer")
+      ->check(CLI::Range(0, 3600));
+  app.add_option("--drain-timeout", config.drain_timeout_seconds, "Seconds that calls may go on after that")
       ->check(CLI::Range(0, 3600));
   app.add_option("--write-timeout", config.write_timeout_seconds,
                  "Seconds that a caller may leave an answer untaken; then its call is cancelled")

@@ -33,6 +33,11 @@ struct Config {
   int request_memory_mib = 512;
   /// Sum of the sizes of the model files that are served.
   int models_memory_mib = 1024;
+  /// Generations of a model that stay in the directory, the one that is served included.
+  int keep_generations = 2;
+  /// How long the server says that it is not ready and takes calls all the same, after SIGTERM: for a balancer to see
+  /// it.
+  int drain_delay_seconds = 0;
   /// How long calls may go on after SIGTERM.
   int drain_timeout_seconds = 30;
   /// How long a caller may leave a message of its call untaken, before the call is cancelled.

@@ -44,7 +44,23 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-/// Makes renames and removals in a directory last.
+/// Of a link or symlink that failed.
+absl::Status creation_error(const std::filesystem::path& path) {
+  if (errno == EEXIST) return absl::AlreadyExistsError(absl::StrFormat("%s is there already.", path.string()));
+  return io_error("create", path);
+}
+
+/// Whether a link was made after all: NFS reports a failure when the answer was lost and the request repeated. Leaves
+/// errno as it was.
+bool has_two_names(int fd) {
+  const int reason = errno;
+  struct stat info {};
+  const bool is_linked = ::fstat(fd, &info) == 0 && info.st_nlink == 2;
+  errno = reason;
+  return is_linked;
+}
+
+/// Makes links and removals in a directory last.
 absl::Status sync_directory(const std::filesystem::path& directory) {
   const Descriptor fd(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd.get() < 0 || ::fsync(fd.get()) != 0) return io_error("sync directory", directory);
@@ -53,17 +69,24 @@ absl::Status sync_directory(const std::filesystem::path& directory) {
 
 }  // namespace
 
-absl::Status write_durably(const std::filesystem::path& directory, const std::string& name, std::string_view bytes) {
+absl::Status create_durably(const std::filesystem::path& directory, const std::string& name, std::string_view bytes) {
   const std::filesystem::path target = directory / name;
   std::string temporary = directory / ("." + name + ".XXXXXX");
   const Descriptor fd(::mkostemp(temporary.data(), O_CLOEXEC));
   if (fd.get() < 0) return io_error("create a temporary file for", target);
-  if (!write_all(fd.get(), bytes) || ::fchmod(fd.get(), 0644) != 0 || ::fsync(fd.get()) != 0 ||
-      ::rename(temporary.c_str(), target.c_str()) != 0) {
-    absl::Status failure = io_error("write", target);
-    ::unlink(temporary.c_str());
-    return failure;
+  absl::Status status;
+  if (!write_all(fd.get(), bytes) || ::fchmod(fd.get(), 0644) != 0 || ::fsync(fd.get()) != 0) {
+    status = io_error("write", target);
+  } else if (::link(temporary.c_str(), target.c_str()) != 0 && !has_two_names(fd.get())) {
+    status = creation_error(target);
   }
+  ::unlink(temporary.c_str());
+  return status.ok() ? sync_directory(directory) : status;
+}
+
+absl::Status link_durably(const std::filesystem::path& directory, const std::string& name, const std::string& target) {
+  const std::filesystem::path link = directory / name;
+  if (::symlink(target.c_str(), link.c_str()) != 0) return creation_error(link);
   return sync_directory(directory);
 }
 
@@ -85,9 +108,11 @@ void remove_leftovers(const std::filesystem::path& directory, std::string_view e
   for (const std::filesystem::path& path : leftovers) ::unlink(path.c_str());
 }
 
-absl::Status remove_durably(const std::filesystem::path& directory, const std::string& name) {
-  const std::filesystem::path target = directory / name;
-  if (::unlink(target.c_str()) != 0 && errno != ENOENT) return io_error("remove", target);
+absl::Status remove_durably(const std::filesystem::path& directory, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const std::filesystem::path target = directory / name;
+    if (::unlink(target.c_str()) != 0 && errno != ENOENT) return io_error("remove", target);
+  }
   return sync_directory(directory);
 }
 

@@ -58,6 +58,8 @@ Metrics::Metrics()
       hypotheses_(counter(*registry_, "binpose_detect_hypotheses_total", "Hypotheses that were answered.")),
       models_(gauge(*registry_, "binpose_models_loaded", "Models that are served.")),
       model_bytes_(gauge(*registry_, "binpose_models_bytes", "Bytes of the files of the models that are served.")),
+      model_directory_age_(
+          gauge(*registry_, "binpose_model_directory_age_seconds", "Seconds since the model directory was last read.")),
       waiting_detections_(waiting(*registry_, "detections")),
       waiting_trainings_(waiting(*registry_, "trainings")),
       request_bytes_(gauge(*registry_, "binpose_requests_held_bytes", "Bytes of requests that wait or are computed.")),

@@ -46,6 +46,7 @@ class Metrics {
 
   prometheus::Gauge& models() { return models_; }
   prometheus::Gauge& model_bytes() { return model_bytes_; }
+  prometheus::Gauge& model_directory_age() { return model_directory_age_; }
   prometheus::Gauge& waiting_detections() { return waiting_detections_; }
   prometheus::Gauge& waiting_trainings() { return waiting_trainings_; }
   prometheus::Gauge& request_bytes() { return request_bytes_; }
@@ -73,6 +74,7 @@ class Metrics {
   prometheus::Counter& hypotheses_;
   prometheus::Gauge& models_;
   prometheus::Gauge& model_bytes_;
+  prometheus::Gauge& model_directory_age_;
   prometheus::Gauge& waiting_detections_;
   prometheus::Gauge& waiting_trainings_;
   prometheus::Gauge& request_bytes_;

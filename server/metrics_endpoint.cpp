@@ -60,7 +60,7 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::start(const st
   add("/healthz", [] { return Page::Content{true, "ok\n"}; });
   add("/readyz", [source] {
     const bool is_ready = source.is_ready();
-    return Page::Content{is_ready, is_ready ? "ready\n" : "not ready\n"};
+    return Page::Content{is_ready, (is_ready ? "ready\n" : "not ready\n") + source.detail()};
   });
   return endpoint;
 }

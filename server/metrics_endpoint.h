@@ -20,6 +20,7 @@ class MetricsEndpoint {
     std::shared_ptr<prometheus::Registry> registry;
     std::function<void()> before_scrape;  ///< brings up to date what is not counted as it happens
     std::function<bool()> is_ready;
+    std::function<std::string()> detail;  ///< lines that /readyz adds
   };
 
   /// @param address  HOST:PORT, port 0 = a free one. Errors: UNAVAILABLE (the address cannot be had).

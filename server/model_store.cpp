@@ -1,11 +1,11 @@
 #include "server/model_store.h"
 
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <condition_variable>
 #include <optional>
+#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -19,54 +19,50 @@
 namespace binpose::server {
 namespace {
 
-constexpr std::string_view kSuffix = ".model";
-constexpr std::size_t kMaxIdLength = 64;
-constexpr std::string_view kIdCharacters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
-
-std::string file_name(std::string_view id) { return std::string(id).append(kSuffix); }
+/// Tries to put a generation before giving up: as many as others may put meanwhile.
+constexpr int kMaxTries = 100;
 
 absl::Status not_found(std::string_view id) {
   return absl::NotFoundError(absl::StrFormat("There is no model '%s'.", id));
 }
 
-absl::StatusOr<StoredModel> load_file(const std::filesystem::path& path, std::string_view id) {
+absl::StatusOr<StoredModel> load_file(const std::filesystem::path& path, std::string_view id,
+                                      std::uint32_t generation) {
   const absl::StatusOr<std::string> bytes = read_file(path, kMaxModelFileBytes);
   if (!bytes.ok()) return bytes.status();
-  return open_envelope(id, *bytes);
-}
-
-/// None when there is no such file.
-template <class Stamp>
-std::optional<Stamp> stamp_of(const std::filesystem::path& path) {
-  struct stat info {};
-  if (::stat(path.c_str(), &info) != 0) return std::nullopt;
-  return Stamp{info.st_ino, info.st_size, info.st_mtim.tv_sec * 1'000'000'000 + info.st_mtim.tv_nsec};
+  absl::StatusOr<StoredModel> stored = open_envelope(id, *bytes);
+  if (stored.ok() && generation != kUnnumbered) stored->generation = generation;
+  return stored;
 }
 
 }  // namespace
 
-absl::Status check_model_id(std::string_view field, std::string_view id) {
-  constexpr std::string_view kRule = "it must be 1 to 64 characters of A-Z a-z 0-9 . _ - and neither '.' nor '..'";
-  if (id.size() > kMaxIdLength) {
-    return absl::InvalidArgumentError(absl::StrFormat("%s has %d characters; %s.", field, id.size(), kRule));
-  }
-  if (id.empty() || id == "." || id == ".." || id.find_first_not_of(kIdCharacters) != std::string_view::npos) {
-    return absl::InvalidArgumentError(absl::StrFormat("%s is '%s'; %s.", field, id, kRule));
-  }
-  return absl::OkStatus();
-}
+/// What came of looking for the newest generation of a model that can be used.
+struct ModelStore::Look {
+  struct Fault {
+    std::filesystem::path path;
+    ModelFile file;
+    std::string reason;
+  };
+  std::optional<StoredModel> model;  ///< to serve instead of what is served
+  Place place;                       ///< of `model`
+  bool is_gone = false;              ///< the model was deleted
+  bool is_settled = true;            ///< false: a file could not be read just now, or was pruned meanwhile
+  std::vector<Fault> faults;
+};
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::open(const std::filesystem::path& directory,
                                                              const ModelLimits& limits) {
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (!std::filesystem::is_directory(directory, error)) {
-    return absl::InternalError(
-        absl::StrFormat("Cannot use %s as the model directory: %s.", directory.string(), error.message()));
+  if (absl::Status status = make_model_directory(directory); !status.ok()) return status;
+  // To serve nothing because nothing can be read would be worse than not to start.
+  if (absl::Status status = list_model_directory(directory).status(); !status.ok()) {
+    return absl::InternalError(status.message());
   }
-  remove_leftovers(directory, kSuffix);
+  remove_leftovers(directory, kModelSuffix);
   std::unique_ptr<ModelStore> store(new ModelStore(directory, limits));
-  store->follow_directory(limits.load_threads);
+  constexpr int kLooks = 3;  // at a directory where others prune
+  for (int i = 0; i < kLooks && !store->follow_directory(limits.load_threads); ++i) {
+  }
   store->watcher_ = std::jthread([&store = *store](const std::stop_token& stop) { store.watch(stop); });
   return store;
 }
@@ -80,75 +76,110 @@ void ModelStore::watch(const std::stop_token& stop) {
   while (!wake.wait_for(lock, stop, kInterval, [&stop] { return stop.stop_requested(); })) follow_directory(1);
 }
 
-void ModelStore::follow_directory(int threads) {
+/// False when it is worth looking again at once.
+bool ModelStore::follow_directory(int threads) {
   const std::lock_guard disk_lock(disk_mutex_);
-  absl::StatusOr<Stamps> present = list_files();
-  if (!present.ok()) return;  // a share that is away for a moment takes no model with it
+  const absl::StatusOr<DirectoryContent> content = list_directory();
+  if (!content.ok()) return false;
+  for (const auto& [name, file] : content->others) {
+    skip(directory_ / name, file, "its name is not that of a model, '<id>@<generation>.model' or '<id>.model'");
+  }
   std::vector<std::string> gone;
-  for (const auto& [id, stamp] : stamps_) {
-    if (!present->contains(id)) gone.push_back(id);
+  for (const auto& [id, generations] : seen_) {
+    if (!content->models.contains(id)) gone.push_back(id);
   }
   for (const std::string& id : gone) drop(id);
   std::vector<std::string> changed;
-  for (const auto& [id, stamp] : *present) {
-    const auto known = stamps_.find(id);
-    if (known == stamps_.end() || known->second != stamp) changed.push_back(id);
+  for (const auto& [id, generations] : content->models) {
+    const auto known = seen_.find(id);
+    if (known == seen_.end() || known->second != generations) changed.push_back(id);
   }
-  stamps_ = *std::move(present);
-  load_files(changed, threads);
-}
-
-/// The same for the file of one model.
-void ModelStore::follow_file(const std::string& id) {
-  const std::optional<FileStamp> stamp = stamp_of<FileStamp>(directory_ / file_name(id));
-  std::error_code ignored;
-  if (!stamp) {
-    if (std::filesystem::is_directory(directory_, ignored)) drop(id);
-  } else if (const auto known = stamps_.find(id); known == stamps_.end() || known->second != *stamp) {
-    stamps_[id] = *stamp;
-    load_files({id}, 1);
-  }
-}
-
-absl::StatusOr<ModelStore::Stamps> ModelStore::list_files() {
-  Stamps stamps;
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(directory_, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename();
-    const std::optional<FileStamp> stamp = stamp_of<FileStamp>(entry->path());
-    const bool is_being_written = name.starts_with('.') && !name.ends_with(kSuffix);
-    if (!stamp || is_being_written) continue;
-    const std::string id = name.substr(0, name.size() - std::min(name.size(), kSuffix.size()));
-    const bool is_model = name.ends_with(kSuffix) && check_model_id("its name", id).ok();
-    if (is_model) {
-      stamps[id] = *stamp;
-    } else if (std::error_code ignored; !entry->is_directory(ignored) && odd_files_.emplace(name, *stamp).second) {
-      skip(entry->path(), "its name is not that of a model, '<id>.model'");
-    }
-  }
-  if (error) {
-    skip(directory_, error.message());
-    return absl::InternalError(error.message());
-  }
-  return stamps;
-}
-
-void ModelStore::load_files(const std::vector<std::string>& ids, int threads) {
-  std::vector<absl::StatusOr<StoredModel>> loaded(ids.size(), absl::UnknownError(""));
-  parallel_for(static_cast<int>(ids.size()), threads, [&](int i) {
+  std::vector<Look> looks(changed.size());
+  parallel_for(static_cast<int>(changed.size()), threads, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
-    loaded[index] = contain_exceptions([&] { return load_file(directory_ / file_name(ids[index]), ids[index]); });
+    looks[index] = look_for(changed[index], content->models.at(changed[index]));
   });
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    absl::Status status = loaded[i].status();
-    if (status.ok()) status = check_budget(ids[i], loaded[i]->file_bytes);
-    if (status.ok()) {
-      serve(std::make_shared<const StoredModel>(*std::move(loaded[i])));
+  bool is_settled = true;
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    if (apply(changed[i], std::move(looks[i]))) {
+      seen_[changed[i]] = content->models.at(changed[i]);
     } else {
-      skip(directory_ / file_name(ids[i]), std::string(status.message()));
+      is_settled = false;
     }
   }
+  return is_settled;
+}
+
+/// The same for one model; its generations.
+absl::StatusOr<Generations> ModelStore::follow_model(const std::string& id) {
+  const absl::StatusOr<DirectoryContent> content = list_directory();
+  if (!content.ok()) return content.status();
+  const auto found = content->models.find(id);
+  if (found == content->models.end()) {
+    drop(id);
+    return Generations();
+  }
+  if (apply(id, look_for(id, found->second))) seen_[id] = found->second;
+  return found->second;
+}
+
+/// Notes whether the directory is there: a share that is away for a moment takes no model with it.
+absl::StatusOr<DirectoryContent> ModelStore::list_directory() {
+  absl::StatusOr<DirectoryContent> content = list_model_directory(directory_);
+  if (content.ok()) last_look_ = Clock::now();
+  if (is_away_ == content.ok()) {
+    is_away_ = !content.ok();
+    if (is_away_) {
+      spdlog::warn("{} Models are served from memory until it is back.", std::string(content.status().message()));
+    } else {
+      spdlog::info("the model directory {} is back", directory_.string());
+    }
+  }
+  return content;
+}
+
+double ModelStore::directory_age() const { return seconds_since(last_look_); }
+
+ModelStore::Look ModelStore::look_for(const std::string& id, const Generations& generations) const {
+  Look look;
+  const auto current = places_.find(id);
+  for (const auto& entry : std::views::reverse(generations)) {
+    const std::uint32_t generation = entry.first;
+    const ModelFile& file = entry.second;
+    if (file.is_tombstone) {
+      look.is_gone = true;
+      return look;
+    }
+    const bool is_served = current != places_.end() && current->second.generation == generation;
+    if (is_served && current->second.file == file) return look;
+    const std::filesystem::path path = model_path(directory_, id, generation);
+    absl::StatusOr<StoredModel> loaded = contain_exceptions([&] { return load_file(path, id, generation); });
+    if (loaded.ok()) {
+      look.model = *std::move(loaded);
+      look.place = {generation, file};
+      return look;
+    }
+    std::error_code ignored;
+    look.is_settled = !absl::IsInternal(loaded.status());
+    if (!look.is_settled && !std::filesystem::exists(path, ignored)) return look;  // pruned: there are newer ones
+    look.faults.push_back({path, file, std::string(loaded.status().message())});
+    if (!look.is_settled || is_served) return look;  // what is in memory is newer than what else is there
+  }
+  return look;
+}
+
+/// False when the look has to be repeated.
+bool ModelStore::apply(const std::string& id, Look look) {
+  for (const Look::Fault& fault : look.faults) skip(fault.path, fault.file, fault.reason);
+  if (look.is_gone) drop(id);
+  if (!look.model) return look.is_settled;
+  if (absl::Status status = check_budget(id, look.model->file_bytes); !status.ok()) {
+    skip(model_path(directory_, id, look.place.generation), look.place.file, std::string(status.message()));
+  } else {
+    places_[id] = look.place;
+    serve(std::make_shared<const StoredModel>(*std::move(look.model)));
+  }
+  return look.is_settled;
 }
 
 void ModelStore::serve(std::shared_ptr<const StoredModel> stored) {
@@ -157,9 +188,10 @@ void ModelStore::serve(std::shared_ptr<const StoredModel> stored) {
 }
 
 void ModelStore::drop(const std::string& id) {
-  stamps_.erase(id);
+  seen_.erase(id);
+  places_.erase(id);
   const std::lock_guard lock(mutex_);
-  if (models_.erase(id) > 0) spdlog::info("{} is gone: its file was removed", id);
+  if (models_.erase(id) > 0) spdlog::info("{} is gone: its files were removed", id);
 }
 
 absl::Status ModelStore::check_budget(const std::string& id, std::size_t bytes) const {
@@ -174,7 +206,10 @@ absl::Status ModelStore::check_budget(const std::string& id, std::size_t bytes) 
                       static_cast<double>(limits_.total_bytes) / kMiB));
 }
 
-void ModelStore::skip(const std::filesystem::path& path, std::string_view reason) {
+/// Logs and counts a file once, until it changes.
+void ModelStore::skip(const std::filesystem::path& path, const ModelFile& file, std::string_view reason) {
+  const auto [entry, is_new] = skipped_.emplace(path, file);
+  if (!is_new && std::exchange(entry->second, file) == file) return;
   spdlog::warn("skipped {}: {}", path.string(), reason);
   ++skipped_files_;
 }
@@ -205,34 +240,59 @@ std::size_t ModelStore::size() const {
   return models_.size();
 }
 
+std::uint32_t ModelStore::next_generation(const std::string& id, const Generations& known) const {
+  const std::uint32_t newest = known.empty() ? 0 : known.rbegin()->first;
+  const auto served = find(id);  // of an unnumbered file, only its content tells the generation
+  const auto put = put_.find(id);
+  return 1 + std::max({newest, served.ok() ? (*served)->generation : 0, put != put_.end() ? put->second : 0});
+}
+
 absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::string& id, Model model) {
-  const std::lock_guard disk_lock(disk_mutex_);
-  follow_file(id);  // another server may have trained it too
-  const auto previous = find(id);
   auto stored = std::make_shared<StoredModel>();
   stored->id = id;
-  stored->generation = previous.ok() ? (*previous)->generation + 1 : 1;
   stored->create_time = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   stored->model = std::move(model);
-  const std::string bytes = seal_envelope(*stored);
   stored->content_hash = content_hash(stored->model);
-  stored->file_bytes = bytes.size();
-  if (absl::Status status = check_budget(id, bytes.size()); !status.ok()) return status;
-  if (absl::Status status = write_durably(directory_, file_name(id), bytes); !status.ok()) return status;
-  if (const auto stamp = stamp_of<FileStamp>(directory_ / file_name(id))) stamps_[id] = *stamp;
-  serve(stored);
-  return stored;
+  const std::lock_guard disk_lock(disk_mutex_);
+  absl::Status failure;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const absl::StatusOr<Generations> known = follow_model(id);
+    if (!known.ok()) return known.status();
+    stored->generation = next_generation(id, *known);
+    const std::string bytes = seal_envelope(*stored);
+    stored->file_bytes = bytes.size();
+    if (absl::Status status = check_budget(id, bytes.size()); !status.ok()) return status;
+    const absl::StatusOr<ModelFile> file = publish(directory_, id, stored->generation, bytes, *known);
+    if (file.ok()) {
+      places_[id] = {stored->generation, *file};
+      put_[id] = stored->generation;
+      serve(stored);
+      prune(directory_, id, limits_.keep_generations);
+      return stored;
+    }
+    failure = file.status();
+    if (!absl::IsAborted(failure)) break;
+  }
+  return failure;
 }
 
 absl::Status ModelStore::remove(const std::string& id) {
   const std::lock_guard disk_lock(disk_mutex_);
-  follow_file(id);
-  if (!find(id).ok()) return not_found(id);
-  if (absl::Status status = remove_durably(directory_, file_name(id)); !status.ok()) return status;
-  stamps_.erase(id);
-  const std::lock_guard lock(mutex_);
-  models_.erase(id);
-  return absl::OkStatus();
+  absl::Status failure;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const absl::StatusOr<Generations> known = follow_model(id);
+    if (!known.ok()) return known.status();
+    if (!find(id).ok()) return i == 0 ? not_found(id) : absl::OkStatus();  // another server was faster
+    const absl::StatusOr<ModelFile> file = publish(directory_, id, next_generation(id, *known), {}, *known);
+    if (file.ok()) {
+      prune(directory_, id, limits_.keep_generations);
+      drop(id);
+      return absl::OkStatus();
+    }
+    failure = file.status();
+    if (!absl::IsAborted(failure)) break;
+  }
+  return failure;
 }
 
 }  // namespace binpose::server

@@ -17,6 +17,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/model.h"
+#include "server/clock.h"
+#include "server/model_directory.h"
 
 namespace binpose::server {
 
@@ -30,23 +32,20 @@ struct StoredModel {
   Model model;
 };
 
-/// OK, or INVALID_ARGUMENT unless `id` is 1 to 64 characters of [A-Za-z0-9._-] and neither "." nor "..".
-///
-/// @param field  what to call it in the message.
-absl::Status check_model_id(std::string_view field, std::string_view id);
-
 /// Largest model file that is read.
 inline constexpr std::size_t kMaxModelFileBytes = std::size_t{256} << 20;
 
 /// What may be held of models.
 struct ModelLimits {
   std::size_t total_bytes = std::size_t{1} << 30;  ///< sum of the sizes of the files
+  std::size_t keep_generations = 2;                ///< of a model in the directory, the one that is served included
   int load_threads = 1;                            ///< how many files are read at once by open()
 };
 
-/// The models by ID, in memory and, as `<id>.model`, in a directory. What put() and remove() acknowledge survives a
-/// power cut. What another process puts into the directory or removes is followed within 2 seconds; a file that cannot
-/// be used never takes the place of a model that is served. Thread-safe; readers never wait for the disk.
+/// The models by ID, in memory and in a directory that other servers may share. What put() and remove() acknowledge
+/// survives a power cut. What another server puts or removes is followed within 2 seconds; a file that cannot be used
+/// never takes the place of a model that is served, and while the directory is away all are. Thread-safe; readers never
+/// wait for the disk.
 class ModelStore {
  public:
   /// Loads the models of `directory`, which is made if it is missing. A file that is torn, foreign or unreadable is
@@ -60,46 +59,53 @@ class ModelStore {
   std::vector<std::shared_ptr<const StoredModel>> list() const;
   std::size_t size() const;
 
-  /// Saves a model and then, only then, serves it in place of the one before. Errors: INTERNAL (not saved),
-  /// RESOURCE_EXHAUSTED (over ModelLimits); either way the one before stays.
+  /// Saves a model as the next generation and then, only then, serves it in place of the one before. Errors: INTERNAL
+  /// (not saved), UNAVAILABLE (the directory is away), RESOURCE_EXHAUSTED (over ModelLimits); the one before stays.
   absl::StatusOr<std::shared_ptr<const StoredModel>> put(const std::string& id, Model model);
-  /// Removes a model from the directory, then from memory; who holds it keeps it. Errors: NOT_FOUND, INTERNAL.
+  /// Removes a model from the directory, then from memory; who holds it keeps it. Errors: NOT_FOUND, INTERNAL,
+  /// UNAVAILABLE (the directory is away).
   absl::Status remove(const std::string& id);
 
   /// Times that a file could not be used.
   std::size_t skipped_files() const { return skipped_files_; }
   /// Sum of the sizes of the files that are served.
   std::size_t total_bytes() const;
+  /// Seconds since the directory was last read; large while it is away.
+  double directory_age() const;
 
  private:
-  /// Tells whether a file is still the one that was read.
-  struct FileStamp {
-    std::uint64_t inode = 0;
-    std::int64_t size = 0;
-    std::int64_t change_time = 0;  // nanoseconds
-    bool operator==(const FileStamp&) const = default;
+  /// The file that a served model was read from.
+  struct Place {
+    std::uint32_t generation = 0;
+    ModelFile file;
   };
-  using Stamps = std::map<std::string, FileStamp, std::less<>>;
+  struct Look;
 
   ModelStore(std::filesystem::path directory, const ModelLimits& limits)
       : directory_(std::move(directory)), limits_(limits) {}
-  void follow_directory(int threads);
-  void follow_file(const std::string& id);
-  absl::StatusOr<Stamps> list_files();
-  void load_files(const std::vector<std::string>& ids, int threads);
+  bool follow_directory(int threads);
+  absl::StatusOr<Generations> follow_model(const std::string& id);
+  absl::StatusOr<DirectoryContent> list_directory();
+  Look look_for(const std::string& id, const Generations& generations) const;
+  bool apply(const std::string& id, Look look);
+  std::uint32_t next_generation(const std::string& id, const Generations& known) const;
   void drop(const std::string& id);
   absl::Status check_budget(const std::string& id, std::size_t bytes) const;
   void serve(std::shared_ptr<const StoredModel> stored);
-  void skip(const std::filesystem::path& path, std::string_view reason);
+  void skip(const std::filesystem::path& path, const ModelFile& file, std::string_view reason);
   void watch(const std::stop_token& stop);
 
   const std::filesystem::path directory_;
   const ModelLimits limits_;
   std::atomic<std::size_t> skipped_files_ = 0;
-  std::mutex disk_mutex_;     ///< held while a file and its entry change; taken before mutex_
-  Stamps stamps_;             ///< of the files that were looked at, good or not; guarded by disk_mutex_
-  Stamps odd_files_;          ///< others that were logged already; guarded by disk_mutex_
-  mutable std::mutex mutex_;  ///< guards models_
+  std::atomic<Clock::time_point> last_look_ = Clock::now();  ///< when the directory was last read
+  std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change; before mutex_
+  std::map<std::string, Generations, std::less<>> seen_;   ///< that were dealt with
+  std::map<std::string, std::uint32_t, std::less<>> put_;  ///< generations that this server put last
+  std::map<std::string, Place, std::less<>> places_;       ///< of the models that are served
+  std::map<std::string, ModelFile> skipped_;               ///< files that were logged already, by path
+  bool is_away_ = false;                                   ///< the directory
+  mutable std::mutex mutex_;                               ///< guards models_
   std::map<std::string, std::shared_ptr<const StoredModel>, std::less<>> models_;
   std::jthread watcher_;  ///< last, so that it ends before the rest goes
 };

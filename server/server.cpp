@@ -12,6 +12,7 @@
 #include <chrono>
 #include <fstream>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -82,9 +83,10 @@ Server::~Server() {
 
 absl::Status Server::load() {
   if (absl::Status status = tokens_.load(config_.token_file); !status.ok()) return status;
-  absl::StatusOr<std::unique_ptr<ModelStore>> models = ModelStore::open(
-      config_.model_dir,
-      {.total_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20, .load_threads = config_.threads});
+  absl::StatusOr<std::unique_ptr<ModelStore>> models =
+      ModelStore::open(config_.model_dir, {.total_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20,
+                                           .keep_generations = static_cast<std::size_t>(config_.keep_generations),
+                                           .load_threads = config_.threads});
   if (!models.ok()) return models.status();
   models_ = *std::move(models);
   const Backend backend = {*models_, detections_, trainings_, requests_, tokens_, metrics_, drain_, writes_};
@@ -98,11 +100,19 @@ absl::Status Server::serve_metrics() {
   absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
       MetricsEndpoint::start(config_.metrics, {.registry = metrics_.registry(),
                                                .before_scrape = [this] { update_metrics(); },
-                                               .is_ready = [this] { return is_ready_.load(); }});
+                                               .is_ready = [this] { return is_ready_.load(); },
+                                               .detail = [this] { return directory_detail(); }});
   if (!endpoint.ok()) return endpoint.status();
   metrics_endpoint_ = *std::move(endpoint);
   metrics_address_ = with_port(config_.metrics, metrics_endpoint_->port());
   return absl::OkStatus();
+}
+
+std::string Server::directory_detail() const {
+  constexpr double kPatience = 5;  // seconds; it is looked at twice a second
+  if (!is_ready_ || models_->directory_age() < kPatience) return "";
+  return absl::StrFormat("The model directory has not been read for %.0f s; the models of then are served.\n",
+                         models_->directory_age());
 }
 
 void Server::update_metrics() {
@@ -116,6 +126,7 @@ void Server::update_metrics() {
   for (const auto& model : models_->list()) served.insert(model->id);
   metrics_.keep_models(served);
   metrics_.model_bytes().Set(static_cast<double>(models_->total_bytes()));
+  metrics_.model_directory_age().Set(models_->directory_age());
   prometheus::Counter& skipped = metrics_.skipped_model_files();
   skipped.Increment(std::max(0.0, static_cast<double>(models_->skipped_files()) - skipped.Value()));
 }
@@ -150,6 +161,7 @@ void Server::stop() {
   if (grpc_server_ == nullptr) return;
   is_ready_ = false;
   grpc_server_->GetHealthCheckService()->SetServingStatus(false);
+  std::this_thread::sleep_for(std::chrono::seconds(config_.drain_delay_seconds));
   drain_.start();
   if (!drain_.wait_for_calls(std::chrono::seconds(config_.drain_timeout_seconds))) {
     spdlog::warn("calls still run after {} s; they are cancelled", config_.drain_timeout_seconds);

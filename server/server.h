@@ -28,7 +28,8 @@ class Server {
   /// The same of GET /metrics; empty if it is not served.
   const std::string& metrics_address() const { return metrics_address_; }
 
-  /// Health says NOT_SERVING; what runs is finished, up to the drain timeout; the rest is cancelled.
+  /// Health says NOT_SERVING; after the drain delay no more calls are taken; what runs is finished, up to the drain
+  /// timeout; the rest is cancelled.
   void stop();
 
  private:
@@ -36,6 +37,7 @@ class Server {
   absl::Status serve_metrics();
   absl::Status load();
   absl::Status listen();
+  std::string directory_detail() const;
   void update_metrics();
 
   const Config config_;

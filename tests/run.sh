@@ -10,7 +10,8 @@ deploy/install-packages.sh test
 cmake --preset dev
 cmake --build "$build"
 
-# The linter of the wire API is an npm package; where npm cannot fetch it, its test is skipped and says so.
+# The linter of the wire API and the schemas of Kubernetes are npm packages; where npm cannot fetch them, their tests are
+# skipped and say so.
 if ! cmp -s tests/lint/package.json "$build/package.json"; then
   cp tests/lint/package.json "$build/"
   npm install --prefix "$build" --no-package-lock --ignore-scripts --no-audit --no-fund --loglevel=error \

@@ -33,7 +33,7 @@ Client connect(const GlobalOptions& global) {
                            .tls_cert = text_of(global.tls_cert),
                            .tls_key = text_of(global.tls_key),
                            .token = first_line(text_of(global.token_file))},
-                timeouts);
+                timeouts, Retries{.attempts = global.retries});
 }
 
 void report(const absl::Status& error) {

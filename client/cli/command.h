@@ -22,6 +22,7 @@ struct GlobalOptions {
   std::string tls_cert;
   std::string tls_key;
   std::string token_file;
+  int retries = Retries().attempts;
 };
 
 /// What the shell gets to see.

@@ -36,10 +36,10 @@ class SceneWriter {
  private:
   void write_all(const ScanOptions& options, DetectStream& stream) {
     for (std::size_t i = 0; i < reads_.size() && !is_stopped_; ++i) {
-      const absl::StatusOr<v1::DetectRequest> request = make_request(options, options.scenes[i]);
+      absl::StatusOr<v1::DetectRequest> request = make_request(options, options.scenes[i]);
       reads_[i].set_value(request.status());
       // Where writing fails the stream has ended; whoever reads its answers will see.
-      if (request.ok() && !stream.write(*request).ok()) return;
+      if (request.ok() && !stream.write(*std::move(request)).ok()) return;
     }
     stream.done_writing();
   }

@@ -27,9 +27,14 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   GlobalOptions global;
-  app.add_option("--server", global.server, "Address of the server, HOST:PORT")
+  app.add_option("--server", global.server,
+                 "Address of the server, HOST:PORT; of several with commas between, the next where one is lost")
       ->envname("BINPOSE_SERVER")
       ->capture_default_str();
+  app.add_option("--retries", global.retries,
+                 "Attempts in a row to open a lost stream again and send what was not answered; 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000));
   app.add_flag("--json", global.json, "Print the answers as JSON, one object per line");
   app.add_option("--timeout", global.timeout_seconds, "Seconds to wait for an answer; for a training: for all of it")
       ->check(CLI::Range(0.001, 1e6));

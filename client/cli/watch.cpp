@@ -35,14 +35,14 @@ class Searcher {
 
   /// Whether the scan was dealt with: answered, or not worth another try.
   bool search(const std::filesystem::path& file) {
-    const absl::StatusOr<v1::DetectRequest> request = make_request(options_.scan, file.string());
+    absl::StatusOr<v1::DetectRequest> request = make_request(options_.scan, file.string());
     if (!request.ok()) {
       say(request.status());
       return true;
     }
     if (stream_ == nullptr) stream_ = client_.open_detect_stream();
     std::optional<v1::DetectResponse> answer;
-    if (stream_->write(*request).ok()) answer = stream_->read();
+    if (stream_->write(*std::move(request)).ok()) answer = stream_->read();
     if (!answer.has_value()) {
       const absl::Status fault = stream_->finish();
       stream_.reset();

@@ -68,6 +68,15 @@ TEST(Client, NoServerIsAnErrorThatNamesTheAddress) {
   EXPECT_THAT(sentence(status), AllOf(HasSubstr(address), HasSubstr("Is binpose-server running there")));
 }
 
+TEST(Client, GoesOnToTheNextServerWhereOneCannotBeReached) {
+  FakeServer server;
+  Client client("127.0.0.1:1, " + server.address());
+  EXPECT_TRUE(client.list_models().ok());
+  EXPECT_TRUE(client.check_health().ok());
+  EXPECT_EQ(Client("127.0.0.1:1," + server.address(), {}, {.attempts = 0}).list_models().status().code(),
+            absl::StatusCode::kUnavailable);
+}
+
 TEST(Client, AnotherServiceIsToldFromOurs) {
   FakeServer server;
   server.call_status = {grpc::StatusCode::UNIMPLEMENTED, ""};

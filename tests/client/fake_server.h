@@ -39,7 +39,9 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
 
   // To be set before the first call.
   Answer answer = [](const v1::DetectRequest&) { return v1::DetectResponse(); };
-  int answers_before_end = -1;  ///< then the stream breaks with INTERNAL; -1: never
+  int answers_before_end = -1;  ///< then the stream breaks; -1: never
+  grpc::Status break_status = {grpc::StatusCode::INTERNAL, "The fake server has had enough."};
+  int streams_that_break = -1;  ///< those after them do not; -1: all break
   grpc::Status call_status;     ///< of every call of the ModelService
   bool sends_model = true;
 
@@ -55,18 +57,28 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
     const std::lock_guard lock(mutex_);
     return stream_count_;
   }
+  /// The header x-model-id of each stream.
+  std::vector<std::string> routing_keys() {
+    const std::lock_guard lock(mutex_);
+    return routing_keys_;
+  }
 
  private:
   using DetectChannel = grpc::ServerReaderWriter<v1::DetectResponse, v1::DetectRequest>;
 
   /// Takes no request before it has answered the last one: more back-pressure than the wire API's two requests ahead.
-  grpc::Status Detect(grpc::ServerContext* /*context*/, DetectChannel* stream) override {
+  grpc::Status Detect(grpc::ServerContext* context, DetectChannel* stream) override {
+    int limit = answers_before_end;
     {
       const std::lock_guard lock(mutex_);
-      ++stream_count_;
+      if (stream_count_++ == streams_that_break) streams_that_break = 0;
+      if (streams_that_break == 0) limit = -1;
+      const auto key = context->client_metadata().find("x-model-id");
+      const bool has_key = key != context->client_metadata().end();
+      routing_keys_.push_back(has_key ? std::string(key->second.data(), key->second.size()) : "");
     }
     v1::DetectRequest request;
-    for (int answered = 0; answered != answers_before_end; ++answered) {
+    for (int answered = 0; answered != limit; ++answered) {
       if (!stream->Read(&request)) return grpc::Status::OK;
       {
         const std::lock_guard lock(mutex_);
@@ -76,7 +88,7 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
       response.set_request_id(request.request_id());
       if (!stream->Write(response)) return grpc::Status::CANCELLED;
     }
-    return {grpc::StatusCode::INTERNAL, "The fake server has had enough."};
+    return break_status;
   }
 
   grpc::Status Train(grpc::ServerContext* /*context*/, const v1::TrainRequest* request,
@@ -134,6 +146,7 @@ class FakeServer final : v1::ModelService::Service, v1::DetectionService::Servic
   std::vector<v1::DetectRequest> detect_requests_;
   v1::TrainRequest train_request_;
   int stream_count_ = 0;
+  std::vector<std::string> routing_keys_;
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };

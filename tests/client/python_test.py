@@ -136,6 +136,35 @@ class PythonTest(unittest.TestCase):
             client.models()
         self.assertEqual(caught.exception.code, grpc.StatusCode.UNAVAILABLE)
 
+    def test_goes_on_to_the_next_server_where_one_is_gone(self):
+        with binpose.Client(f"127.0.0.1:1,{server.address}") as client:
+            self.assertGreater(len(client.detect("part", scan()).parts), 5)
+        with binpose.Client(f"127.0.0.1:1, {server.address}") as client:
+            self.assertEqual(client.model("part").id, "part")
+        with binpose.Client(f"127.0.0.1:1,{server.address}", retries=0) as client, \
+                self.assertRaises(binpose.BinposeError) as caught:
+            client.detect("part", scan())
+        self.assertEqual(caught.exception.code, grpc.StatusCode.UNAVAILABLE)
+
+    def test_a_server_that_is_replaced_in_the_middle_of_a_stream_loses_no_scan(self):
+        def scans():
+            for number in range(6):
+                if number == 3:
+                    first.stop()
+                yield scan()
+
+        models = Path(directory.name) / "models"
+        first = Server(models)
+        with binpose.Client(f"{first.address},{server.address}") as client:
+            results = list(client.detect_all("part", scans()))
+        self.assertEqual([len(result.parts) for result in results], [len(results[0].parts)] * 6)
+
+    def test_attempts_end_with_the_time_out_and_with_their_number(self):
+        for options, call in [({"retries": 10**6}, {"timeout": 0.3}), ({"retries": 2}, {"timeout": 60})]:
+            with binpose.Client("127.0.0.1:1", **options) as client, self.assertRaises(binpose.BinposeError) as caught:
+                client.detect("part", scan(), **call)
+            self.assertIn(caught.exception.code, [grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED])
+
     def test_wrong_arrays_and_units_are_refused_by_name(self):
         for message, call in [("unit", lambda: scan(unit="cm")),
                               ("depth", lambda: scan(depth[0])),

@@ -392,7 +392,7 @@ class OperationsTest(StressTest):
 
     def test_a_copied_file_is_served_and_a_removed_one_dropped(self):
         start = time.monotonic()
-        shutil.copy(self.directory / "part.model", self.directory / "copy.model")
+        shutil.copy(next(self.directory.glob("part@*.model")), self.directory / "copy.model")
         while "copy" not in [entry.id for entry in self.api.models()] and time.monotonic() < start + 10:
             time.sleep(0.02)
         served = time.monotonic() - start

@@ -33,10 +33,11 @@ class Api:
         return getattr(self.channel, kind)(f"/binpose.v1.{name}", request_serializer=request.SerializeToString,
                                            response_deserializer=response.FromString)
 
-    def detect_bytes(self, requests):
+    def detect_bytes(self, requests, **options):
         """The same with requests that are encoded already."""
         return self.channel.stream_stream("/binpose.v1.DetectionService/Detect", request_serializer=None,
-                                          response_deserializer=detection.DetectResponse.FromString)(iter(requests))
+                                          response_deserializer=detection.DetectResponse.FromString)(
+            iter(requests), **options)
 
     def detect(self, requests, **options):
         return self._method("stream_stream", "DetectionService/Detect", detection.DetectRequest,

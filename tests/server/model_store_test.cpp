@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <set>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "core/io/model_file.h"
 #include "core/io/read_mesh.h"
@@ -49,6 +53,15 @@ void write(const std::filesystem::path& path, const std::string& bytes) {
 class ModelStoreTest : public ::testing::Test {
  protected:
   const std::filesystem::path& path() const { return directory_.path(); }
+  /// Names of all files but hidden ones.
+  std::set<std::string> model_files() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(path())) {
+      const std::string name = entry.path().filename();
+      if (!name.starts_with('.')) names.insert(name);
+    }
+    return names;
+  }
 
  private:
   TemporaryDirectory directory_;
@@ -64,13 +77,13 @@ TEST_F(ModelStoreTest, GivesBackAfterReopeningWhatWasPut) {
   EXPECT_EQ((*after)->generation, 1);
   EXPECT_EQ((*after)->create_time, (*before)->create_time);
   EXPECT_EQ((*after)->content_hash, content_hash(block()));
-  EXPECT_EQ((*after)->file_bytes, std::filesystem::file_size(path() / "block.model"));
+  EXPECT_EQ((*after)->file_bytes, std::filesystem::file_size(path() / "block@1.model"));
   EXPECT_EQ(content_hash((*after)->model), content_hash(block()));
 }
 
 TEST_F(ModelStoreTest, MakesTheDirectoryIfItIsMissing) {
   EXPECT_TRUE(open_store(path() / "a" / "b")->put("block", block()).ok());
-  EXPECT_TRUE(std::filesystem::exists(path() / "a" / "b" / "block.model"));
+  EXPECT_TRUE(std::filesystem::exists(path() / "a" / "b" / "block@1.model"));
 }
 
 TEST_F(ModelStoreTest, ADirectoryThatCannotBeHadIsAnErrorThatNamesIt) {
@@ -103,8 +116,8 @@ TEST_F(ModelStoreTest, ASaveThatFailsSaysWhyAndLeavesTheOldModelServed) {
   ASSERT_TRUE(store->put("block", block()).ok());
   std::filesystem::remove_all(path() / "models");
   const auto replaced = store->put("block", block());
-  EXPECT_EQ(replaced.status().code(), absl::StatusCode::kInternal);
-  EXPECT_THAT(std::string(replaced.status().message()), HasSubstr("block.model: No such file"));
+  EXPECT_EQ(replaced.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(replaced.status().message()), HasSubstr("models: No such file"));
   EXPECT_EQ(store->find("block").value()->generation, 1);
 }
 
@@ -121,7 +134,7 @@ TEST_F(ModelStoreTest, IdsThatLookLikeTemporaryOrModelFilesClashWithNone) {
 
 TEST_F(ModelStoreTest, SkipsAndCountsWhatIsNoModelAndDeletesNothing) {
   ASSERT_TRUE(open_store(path())->put("good", block()).ok());
-  const std::string good = read(path() / "good.model");
+  const std::string good = read(path() / "good@1.model");
   write(path() / "torn.model", good.substr(0, good.size() / 2));
   write(path() / "short.model", good.substr(0, 10));
   write(path() / "empty.model", "");
@@ -136,8 +149,8 @@ TEST_F(ModelStoreTest, SkipsAndCountsWhatIsNoModelAndDeletesNothing) {
   const auto store = open_store(path());
   EXPECT_EQ(store->size(), 1);
   EXPECT_TRUE(store->find("good").ok());
-  EXPECT_EQ(store->skipped_files(), 9);  // all but what is being written
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path()), {}), 12);
+  EXPECT_EQ(store->skipped_files(), 9);                                           // all but what is being written
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path()), {}), 13);  // and the sign
 }
 
 TEST_F(ModelStoreTest, RemovesWhatACrashLeftBehindButNoFileThatMayStillBeWritten) {
@@ -156,7 +169,7 @@ TEST_F(ModelStoreTest, RemovesWhatACrashLeftBehindButNoFileThatMayStillBeWritten
 
 TEST_F(ModelStoreTest, ABitFlippedAnywhereHidesThatModelAlone) {
   ASSERT_TRUE(open_store(path())->put("good", block()).ok());
-  const std::string good = read(path() / "good.model");
+  const std::string good = read(path() / "good@1.model");
   constexpr std::size_t kHeader = 160;
   for (std::size_t i = 0; i < good.size(); i += i < kHeader ? 1 : good.size() / 40) {
     std::string bad = good;
@@ -170,7 +183,7 @@ TEST_F(ModelStoreTest, ABitFlippedAnywhereHidesThatModelAlone) {
 
 TEST_F(ModelStoreTest, AFileCanBeCopiedUnderAnotherId) {
   ASSERT_TRUE(open_store(path())->put("block", block()).ok());
-  std::filesystem::copy(path() / "block.model", path() / "copy.model");
+  std::filesystem::copy(path() / "block@1.model", path() / "copy.model");
   EXPECT_EQ(open_store(path())->find("copy").value()->id, "copy");
 }
 
@@ -199,11 +212,104 @@ TEST_F(ModelStoreTest, TwoServersThatTrainTheSameIdCountGenerationsTogether) {
   EXPECT_EQ(other->put("block", block()).value()->generation, 3);
 }
 
+TEST_F(ModelStoreTest, TrainingsOfOneIdOnThreeServersAtOnceGiveOneGenerationEach) {
+  constexpr int kServers = 3;
+  constexpr int kTrainings = 20;
+  std::vector<std::unique_ptr<ModelStore>> stores;
+  for (int i = 0; i < kServers; ++i) {
+    stores.push_back(ModelStore::open(path(), {.keep_generations = 1}).value());
+  }
+  std::vector<std::vector<std::uint32_t>> generations(kServers);
+  {
+    std::vector<std::jthread> threads;
+    for (int s = 0; s < kServers; ++s) {
+      threads.emplace_back([&, s] {
+        for (int i = 0; i < kTrainings; ++i) {
+          generations[s].push_back(stores[s]->put("block", block()).value()->generation);
+        }
+      });
+    }
+  }
+  std::set<std::uint32_t> all;
+  for (const auto& of_server : generations) {
+    EXPECT_TRUE(std::is_sorted(of_server.begin(), of_server.end()));
+    all.insert(of_server.begin(), of_server.end());
+  }
+  EXPECT_EQ(all.size(), kServers * kTrainings);
+  for (const auto& store : stores) {
+    EXPECT_TRUE(soon([&] { return store->find("block").value()->generation == *all.rbegin(); }));
+  }
+  EXPECT_EQ(model_files(), std::set<std::string>({"block@" + std::to_string(*all.rbegin()) + ".model"}));
+}
+
+TEST_F(ModelStoreTest, KeepsTheConfiguredNumberOfGenerations) {
+  const auto store = ModelStore::open(path(), {.keep_generations = 3}).value();
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(store->put("block", block()).ok());
+  EXPECT_EQ(model_files(), std::set<std::string>({"block@3.model", "block@4.model", "block@5.model"}));
+  EXPECT_EQ(open_store(path())->find("block").value()->generation, 5);
+}
+
+TEST_F(ModelStoreTest, ADeletedModelStaysAwayThoughAnOlderGenerationComesBackAndCountsOnWhenTrainedAgain) {
+  const auto store = open_store(path());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(store->put("block", block()).ok());
+  const std::string third = read(path() / "block@3.model");
+  ASSERT_TRUE(store->remove("block").ok());
+  EXPECT_EQ(model_files(), std::set<std::string>({"block@4.model"}));
+  write(path() / "block@3.model", third);  // as if the server had been killed before it removed it
+  EXPECT_EQ(open_store(path())->size(), 0);
+  EXPECT_EQ(store->put("block", block()).value()->generation, 5);
+  EXPECT_EQ(open_store(path())->size(), 1);
+}
+
+TEST_F(ModelStoreTest, ReadsTheFilesOfEarlierReleasesAndCountsTheirGenerationsOn) {
+  {
+    const auto store = open_store(path());
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(store->put("block", block()).ok());
+  }
+  std::filesystem::remove(path() / "block@2.model");
+  std::filesystem::rename(path() / "block@3.model", path() / "block.model");
+  std::filesystem::remove(path() / ".binpose");
+  const auto store = open_store(path());
+  EXPECT_EQ(store->find("block").value()->generation, 3);
+  EXPECT_EQ(store->put("block", block()).value()->generation, 4);
+  EXPECT_EQ(store->put("block", block()).value()->generation, 5);
+  EXPECT_EQ(model_files(), std::set<std::string>({"block@4.model", "block@5.model"}));
+}
+
+TEST_F(ModelStoreTest, ANewestGenerationThatIsTornLeavesTheOneBefore) {
+  {
+    const auto store = open_store(path());
+    for (int i = 0; i < 2; ++i) ASSERT_TRUE(store->put("block", block()).ok());
+  }
+  write(path() / "block@2.model", read(path() / "block@2.model").substr(0, 1000));
+  const auto store = open_store(path());
+  EXPECT_EQ(store->find("block").value()->generation, 1);
+  EXPECT_EQ(store->skipped_files(), 1);
+  EXPECT_EQ(store->put("block", block()).value()->generation, 3);
+}
+
+TEST_F(ModelStoreTest, ServesFromMemoryWhileTheDirectoryIsAwayAndCatchesUp) {
+  const std::filesystem::path models = path() / "models";
+  const auto store = open_store(models);
+  ASSERT_TRUE(store->put("block", block()).ok());
+  std::filesystem::rename(models, path() / "away");
+  std::filesystem::create_directory(models);  // what is under the place where a share was mounted
+  EXPECT_TRUE(soon([&] { return store->directory_age() > 1; }));
+  EXPECT_TRUE(store->find("block").ok());
+  EXPECT_EQ(store->put("block", block()).status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(store->remove("block").code(), absl::StatusCode::kUnavailable);
+  EXPECT_TRUE(std::filesystem::is_empty(models));
+  ASSERT_TRUE(open_store(path() / "away")->put("block", block()).ok());
+  std::filesystem::remove(models);
+  std::filesystem::rename(path() / "away", models);
+  EXPECT_TRUE(soon([&] { return store->find("block").value()->generation == 2; }));
+}
+
 TEST_F(ModelStoreTest, AFileThatIsTornWhileItIsCopiedNeverTakesTheModelsPlace) {
   const auto store = open_store(path());
   ASSERT_TRUE(store->put("block", block()).ok());
-  const std::string good = read(path() / "block.model");
-  write(path() / "block.model", good.substr(0, good.size() / 2));
+  const std::string good = read(path() / "block@1.model");
+  write(path() / "block@1.model", good.substr(0, good.size() / 2));
   EXPECT_TRUE(soon([&] { return store->skipped_files() == 1; }));
   EXPECT_TRUE(store->find("block").ok());
 }
@@ -214,7 +320,7 @@ TEST_F(ModelStoreTest, AModelOverTheMemoryBudgetIsRefusedAndTheOthersStay) {
   const auto refused = store->put("second", block());
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(refused.status().message()), HasSubstr("--models-memory-mib"));
-  EXPECT_FALSE(std::filesystem::exists(path() / "second.model"));
+  EXPECT_FALSE(std::filesystem::exists(path() / "second@1.model"));
   EXPECT_TRUE(store->put("block", block()).ok());  // in its own place
 }
 

@@ -12,6 +12,7 @@
 #include <future>
 #include <map>
 #include <optional>
+#include <thread>
 
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "tests/server/http_get.h"
@@ -173,6 +174,22 @@ TEST_F(MetricsTest, CountTheModelFilesThatWereSkipped) {
   std::ofstream(model_dir() / "torn.model") << "torn";
   start();
   expect_lines({"binpose_model_files_skipped_total 1\n"});
+}
+
+TEST_F(MetricsTest, SayThatTheModelDirectoryIsAwayWhileTheServerStaysReady) {
+  RunningServer& server = start();
+  ASSERT_TRUE(server.train(train_request("block")).ok());
+  EXPECT_THAT(http_get(address(), "/readyz"), ::testing::EndsWith("\r\n\r\nready\n"));
+  std::filesystem::rename(model_dir(), model_dir().string() + ".away");
+  std::string answer;
+  for (int i = 0; i < 600 && answer.find("has not been read") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    answer = http_get(address(), "/readyz");
+  }
+  EXPECT_THAT(answer, ::testing::AllOf(HasSubstr("200 OK"), HasSubstr("The model directory has not been read for")));
+  EXPECT_EQ(server.train(train_request("block")).error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(server.detect({detect_request("1", "block")}).front().has_error());
+  std::filesystem::rename(model_dir().string() + ".away", model_dir());
 }
 
 TEST_F(MetricsTest, AreServedWhileOtherSocketsStaySilent) {

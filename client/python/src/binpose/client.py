@@ -4,12 +4,16 @@ from pathlib import Path
 
 import grpc
 
+from binpose import stream
 from binpose.result import Result
 from binpose.scan import unit_of
 from binpose.v1 import detection_service_pb2, detection_service_pb2_grpc, model_service_pb2, model_service_pb2_grpc, types_pb2
 
 # The server states its own limits; gRPC's 4 MB would cut off answers and scans before it can.
-OPTIONS = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
+OPTIONS = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1),
+           # gRPC's own pauses, of up to two minutes, would outlast the restart of a server.
+           ("grpc.initial_reconnect_backoff_ms", 50), ("grpc.min_reconnect_backoff_ms", 2000),
+           ("grpc.max_reconnect_backoff_ms", 1000)]
 
 
 class BinposeError(Exception):
@@ -20,16 +24,43 @@ class BinposeError(Exception):
         self.code = code
 
 
-class Client:
-    """A connection to a server, HOST:PORT; make one and keep it. Its methods may be called from several threads."""
+class _Stubs:
+    """Of one server, or of the balancer before several."""
 
-    def __init__(self, server="localhost:50051", *, timeout=10, credentials=None):
-        """timeout -- seconds that a short call may take; credentials -- from grpc.ssl_channel_credentials(), or none."""
+    def __init__(self, address, credentials):
+        self.channel = (grpc.secure_channel(address, credentials, OPTIONS) if credentials
+                        else grpc.insecure_channel(address, OPTIONS))
+        self.models = model_service_pb2_grpc.ModelServiceStub(self.channel)
+        self.detection = detection_service_pb2_grpc.DetectionServiceStub(self.channel)
+
+
+class _Servers:
+    """Those of a connection, of which one is called until it is lost."""
+
+    def __init__(self, addresses, credentials):
+        self.all = [_Stubs(address.strip(), credentials) for address in addresses.split(",")]
+        self._current = self.all[0]
+
+    def current(self):
+        return self._current
+
+    def leave(self, lost):
+        """Goes on to the next, unless another caller has done so."""
+        if self._current is lost:
+            self._current = self.all[(self.all.index(lost) + 1) % len(self.all)]
+
+
+class Client:
+    """A connection to a server, HOST:PORT, or to several with commas between, of which the next is taken where one is
+    lost. Make one and keep it. Its methods may be called from several threads."""
+
+    def __init__(self, server="localhost:50051", *, timeout=10, credentials=None, retries=8):
+        """timeout -- seconds that a short call may take; credentials -- from grpc.ssl_channel_credentials(), or none;
+        retries -- how often in a row a lost stream of scans is opened again and what was not answered sent again; 0: an
+        error at once."""
         self._timeout = timeout
-        self._channel = (grpc.secure_channel(server, credentials, OPTIONS) if credentials
-                         else grpc.insecure_channel(server, OPTIONS))
-        self._models = model_service_pb2_grpc.ModelServiceStub(self._channel)
-        self._detection = detection_service_pb2_grpc.DetectionServiceStub(self._channel)
+        self._retries = retries
+        self._servers = _Servers(server, credentials)
 
     def __enter__(self):
         return self
@@ -38,7 +69,20 @@ class Client:
         self.close()
 
     def close(self):
-        self._channel.close()
+        for server in self._servers.all:
+            server.channel.close()
+
+    def _call(self, make):
+        """Makes a call, on the next server where one cannot be reached."""
+        with _errors():
+            for tries_left in reversed(range(len(self._servers.all) if self._retries else 1)):
+                server = self._servers.current()
+                try:
+                    return make(server)
+                except grpc.RpcError as error:
+                    if error.code() != grpc.StatusCode.UNAVAILABLE or tries_left == 0:
+                        raise
+                    self._servers.leave(server)
 
     def train(self, model_id, mesh, *, unit, params=None, on_progress=None, timeout=600):
         """Makes a model of a mesh file (a path, or bytes), waits until it is served, and returns the binpose.v1.Model.
@@ -48,30 +92,34 @@ class Client:
         data = mesh if isinstance(mesh, bytes) else Path(mesh).read_bytes()
         request = model_service_pb2.TrainRequest(
             id=model_id, mesh=types_pb2.Mesh(data=data, unit=unit_of(unit)), params=params)
-        model = None
-        with _errors():
-            for progress in self._models.Train(request, timeout=timeout):
+
+        def train(server):
+            model = None
+            for progress in server.models.Train(request, timeout=timeout, metadata=stream.routing(model_id)):
                 if on_progress:
                     on_progress(model_service_pb2.TrainStage.Name(progress.stage), progress.progress)
                 if progress.HasField("model"):
                     model = progress.model
+            return model
+
+        model = self._call(train)
         if model is None:
             raise BinposeError(grpc.StatusCode.INTERNAL, "The training ended without a model.")
         return model
 
     def models(self):
         """All models, binpose.v1.Model each, by ID."""
-        with _errors():
-            request = model_service_pb2.ListModelsRequest()
-            return list(self._models.ListModels(request, timeout=self._timeout).models)
+        request = model_service_pb2.ListModelsRequest()
+        return list(self._call(lambda server: server.models.ListModels(request, timeout=self._timeout)).models)
 
     def model(self, model_id):
-        with _errors():
-            return self._models.GetModel(model_service_pb2.GetModelRequest(id=model_id), timeout=self._timeout)
+        request = model_service_pb2.GetModelRequest(id=model_id)
+        return self._call(lambda server: server.models.GetModel(request, timeout=self._timeout,
+                                                                 metadata=stream.routing(model_id)))
 
     def delete(self, model_id):
-        with _errors():
-            self._models.DeleteModel(model_service_pb2.DeleteModelRequest(id=model_id), timeout=self._timeout)
+        request = model_service_pb2.DeleteModelRequest(id=model_id)
+        self._call(lambda server: server.models.DeleteModel(request, timeout=self._timeout, metadata=stream.routing(model_id)))
 
     def detect(self, models, scan, *, params=None, time_budget=None, timeout=60):
         """Finds parts in one scan. models -- an ID, or several; params -- binpose.v1.DetectParams; time_budget -- seconds
@@ -90,7 +138,8 @@ class Client:
         requests = (detection_service_pb2.DetectRequest(model_ids=ids, cloud=scan, params=params,
                                                         time_budget_seconds=time_budget) for scan in scans)
         with _errors():
-            for answer in self._detection.Detect(requests, timeout=timeout):
+            for answer in stream.answers(self._servers, requests, model_id=ids[0] if ids else "", timeout=timeout,
+                                         retries=self._retries):
                 if answer.HasField("error"):
                     yield BinposeError(_code(answer.error.code), answer.error.message)
                 else:
