@@ -10,8 +10,8 @@
 namespace binpose {
 namespace {
 
-constexpr float kSteadyCosine = 0.5F;          // noise is judged on surfaces within 60 degrees
-constexpr int kFewestNeighbours = 4;           // besides the pixel itself, in a 3 x 3 window
+constexpr float kSteadyCosine = 0.5F;  // noise is judged on surfaces within 60 degrees
+constexpr int kFewestNeighbours = 4;   // besides the pixel itself, in a 3 x 3 window
 /// Depth step between neighbours, in pixel widths per pixel, beyond which they lie on different surfaces.
 constexpr float kSteepest = 3.0F;
 
