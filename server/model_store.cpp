@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <condition_variable>
 #include <optional>
-#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -143,9 +142,10 @@ double ModelStore::directory_age() const { return seconds_since(last_look_); }
 ModelStore::Look ModelStore::look_for(const std::string& id, const Generations& generations) const {
   Look look;
   const auto current = places_.find(id);
-  for (const auto& entry : std::views::reverse(generations)) {
-    const std::uint32_t generation = entry.first;
-    const ModelFile& file = entry.second;
+  // NOLINTNEXTLINE(modernize-loop-convert): clang 14 can't compile libstdc++'s reversed view
+  for (auto entry = generations.rbegin(); entry != generations.rend(); ++entry) {
+    const std::uint32_t generation = entry->first;
+    const ModelFile& file = entry->second;
     if (file.is_tombstone) {
       look.is_gone = true;
       return look;

@@ -17,8 +17,8 @@ bool inside(const OrientedBox& bin, const Eigen::Vector3d& p_scene, double margi
 bool is_outside(const SearchSpace& space, const Eigen::Vector3d& p_scene, double diameter, double margin) {
   const auto near = [&](const OrientedBox& region) { return region.contains(p_scene, diameter); };
   if (!space.regions.empty() && std::none_of(space.regions.begin(), space.regions.end(), near)) return true;
-  if (space.support_plane && space.support_plane->normal.dot(p_scene) <= space.support_plane->offset + margin)
-    return true;
+  const std::optional<Plane>& plane = space.support_plane;
+  if (plane && plane->normal.dot(p_scene) <= plane->offset + margin) return true;
   return space.bin_interior && !inside(*space.bin_interior, p_scene, margin);
 }
 

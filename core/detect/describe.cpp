@@ -25,7 +25,7 @@ void add_uncertainty(const Candidate& candidate, const DepthMap& map, const Mode
   to_origin.topRightCorner<3, 3>() << 0, shift.z(), -shift.y(), -shift.z(), 0, shift.x(), shift.y(), -shift.x(), 0;
   const Matrix6d J = to_origin * to_scene;
   hypothesis.covariance = J * uncertainty.covariance * J.transpose();
-  for (const Twist& motion : uncertainty.free_directions) hypothesis.free_directions.push_back(J * motion);
+  for (const Twist& motion : uncertainty.free_directions) hypothesis.free_directions.emplace_back(J * motion);
 }
 
 }  // namespace

@@ -28,8 +28,9 @@ Symmetry spindle() {
 /// Four turns about z.
 Symmetry square() {
   Symmetry symmetry;
-  for (const double degrees : {90, 180, 270})
+  for (const double degrees : {90, 180, 270}) {
     symmetry.discrete.push_back(testing::pose(degrees, Vector3d::UnitZ(), {}));
+  }
   return symmetry;
 }
 
