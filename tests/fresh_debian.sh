@@ -9,9 +9,11 @@ cd "$(dirname "$0")/.."
 
 debootstrap --variant=minbase bookworm "$directory" "$mirror" >/dev/null
 git clone --quiet . "$directory/binpose"
-trap 'umount "$directory/proc" "$directory/dev"' EXIT
+echo "127.0.0.1 localhost" >"$directory/etc/hosts"  # which Debian's installer writes, not debootstrap
+trap 'umount "$directory/proc" "$directory/dev/pts" "$directory/dev"' EXIT
 mount --bind /proc "$directory/proc"
 mount --bind /dev "$directory/dev"
+mount --bind /dev/pts "$directory/dev/pts"
 
 for command in deploy/quickstart.sh deploy/quickstart.sh tests/run.sh tests/run.sh; do
   start=$(date +%s)
