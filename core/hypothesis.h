@@ -26,9 +26,9 @@ struct PoseHypothesis {
   std::vector<Pose> equivalents;    ///< T_scene_model that show the same, where DetectParams::list_equivalents asks
   /// Of a small motion T' = (translation, rotation about the model's origin) * T_scene_model, metres and radians, scene
   /// axes.
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  Matrix6d covariance = Matrix6d::Zero();
   /// Motions of that kind that the scene hardly resists; see detect/uncertainty.h.
-  std::vector<Eigen::Matrix<double, 6, 1>> free_directions;
+  std::vector<Twist> free_directions;
   double residual = 0;           ///< root mean square distance of the explained surface, metres
   double votes = 0;              ///< weighted votes of the vector pairs
   std::vector<int> occluded_by;  ///< indices into the result: the parts that hide some of this one, ascending

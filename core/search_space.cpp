@@ -17,12 +17,6 @@ const PosePrior* prior_of(const SearchSpace& space, int model_index) {
   return prior == space.priors.end() ? nullptr : &*prior;
 }
 
-bool in_a_region(const SearchSpace& space, const Eigen::Vector3d& p_scene, double slack) {
-  return space.regions.empty() ||
-         std::any_of(space.regions.begin(), space.regions.end(),
-                     [&](const OrientedBox& region) { return region.contains(p_scene, slack); });
-}
-
 absl::Status validate(std::string_view field, const OrientedBox& box) {
   if (!box.T_scene_box.matrix().allFinite() || box.T_scene_box.translation().cwiseAbs().maxCoeff() > kLongest) {
     return absl::InvalidArgumentError(
@@ -57,6 +51,12 @@ absl::Status validate(const PosePrior& prior) {
 }
 
 }  // namespace
+
+bool in_a_region(const SearchSpace& space, const Eigen::Vector3d& p_scene, double slack) {
+  return space.regions.empty() ||
+         std::any_of(space.regions.begin(), space.regions.end(),
+                     [&](const OrientedBox& region) { return region.contains(p_scene, slack); });
+}
 
 Pose turned_to_prior(const SearchSpace& space, int model_index, const Symmetry& symmetry, const Pose& T_scene_model) {
   const PosePrior* prior = prior_of(space, model_index);

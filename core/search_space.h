@@ -21,9 +21,13 @@ struct OrientedBox {
     return T_scene_box.matrix() == other.T_scene_box.matrix() && size == other.size;
   }
 
+  /// A point of the scene in the box's frame.
+  Eigen::Vector3d in_box(const Eigen::Vector3d& p_scene) const {
+    return T_scene_box.linear().transpose() * (p_scene - T_scene_box.translation());
+  }
   /// Whether a point lies inside, or outside by at most `slack` metres along each axis.
   bool contains(const Eigen::Vector3d& p_scene, double slack = 0) const {
-    return ((T_scene_box.inverse() * p_scene).cwiseAbs().array() <= 0.5 * size.array() + slack).all();
+    return (in_box(p_scene).cwiseAbs().array() <= 0.5 * size.array() + slack).all();
   }
 };
 
@@ -63,6 +67,9 @@ struct Slack {
   double distance = 0;  ///< metres
   double angle = 0;     ///< radians
 };
+
+/// Whether a point lies in one of the regions, or outside by at most `slack` metres; where there are none, anywhere.
+bool in_a_region(const SearchSpace& space, const Eigen::Vector3d& p_scene, double slack);
 
 /// The symmetric equivalent of a pose that suits the prior of its model best; the pose itself where there is none.
 Pose turned_to_prior(const SearchSpace& space, int model_index, const Symmetry& symmetry, const Pose& T_scene_model);

@@ -41,15 +41,14 @@ v1::DetectStats to_proto(const DetectStats& stats) {
 }
 
 /// Of a motion of lengths in metres.
-v1::Twist to_twist(const Eigen::Matrix<double, 6, 1>& motion, double metres_per_unit) {
+v1::Twist to_twist(const Twist& motion, double metres_per_unit) {
   v1::Twist message;
   *message.mutable_translation() = to_proto(Eigen::Vector3d(motion.head<3>() / metres_per_unit));
   *message.mutable_rotation() = to_proto(Eigen::Vector3d(motion.tail<3>()));
   return message;
 }
 
-void add_covariance(const Eigen::Matrix<double, 6, 6>& covariance, double metres_per_unit,
-                    v1::PoseHypothesis& message) {
+void add_covariance(const Matrix6d& covariance, double metres_per_unit, v1::PoseHypothesis& message) {
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column) {
       const double unit = (row < 3 ? metres_per_unit : 1) * (column < 3 ? metres_per_unit : 1);

@@ -247,6 +247,26 @@ std::uint32_t ModelStore::next_generation(const std::string& id, const Generatio
   return 1 + std::max({newest, served.ok() ? (*served)->generation : 0, put != put_.end() ? put->second : 0});
 }
 
+/// Puts the next generation of a model into the directory, again while other servers are faster.
+///
+/// @param content  what to write as a generation, empty for a tombstone; an error ends it.
+absl::StatusOr<ModelStore::Place> ModelStore::publish_next(
+    const std::string& id, const std::function<absl::StatusOr<std::string>(std::uint32_t generation)>& content) {
+  absl::Status failure;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const absl::StatusOr<Generations> known = follow_model(id);
+    if (!known.ok()) return known.status();
+    const std::uint32_t generation = next_generation(id, *known);
+    const absl::StatusOr<std::string> bytes = content(generation);
+    if (!bytes.ok()) return bytes.status();
+    const absl::StatusOr<ModelFile> file = publish(directory_, id, generation, *bytes, *known);
+    if (file.ok()) return Place{generation, *file};
+    failure = file.status();
+    if (!absl::IsAborted(failure)) break;
+  }
+  return failure;
+}
+
 absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::string& id, Model model) {
   auto stored = std::make_shared<StoredModel>();
   stored->id = id;
@@ -254,45 +274,34 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::st
   stored->model = std::move(model);
   stored->content_hash = content_hash(stored->model);
   const std::lock_guard disk_lock(disk_mutex_);
-  absl::Status failure;
-  for (int i = 0; i < kMaxTries; ++i) {
-    const absl::StatusOr<Generations> known = follow_model(id);
-    if (!known.ok()) return known.status();
-    stored->generation = next_generation(id, *known);
-    const std::string bytes = seal_envelope(*stored);
+  const auto place = publish_next(id, [&](std::uint32_t generation) -> absl::StatusOr<std::string> {
+    stored->generation = generation;
+    std::string bytes = seal_envelope(*stored);
     stored->file_bytes = bytes.size();
     if (absl::Status status = check_budget(id, bytes.size()); !status.ok()) return status;
-    const absl::StatusOr<ModelFile> file = publish(directory_, id, stored->generation, bytes, *known);
-    if (file.ok()) {
-      places_[id] = {stored->generation, *file};
-      put_[id] = stored->generation;
-      serve(stored);
-      prune(directory_, id, limits_.keep_generations);
-      return stored;
-    }
-    failure = file.status();
-    if (!absl::IsAborted(failure)) break;
-  }
-  return failure;
+    return bytes;
+  });
+  if (!place.ok()) return place.status();
+  places_[id] = *place;
+  put_[id] = place->generation;
+  serve(stored);
+  prune(directory_, id, limits_.keep_generations);
+  return stored;
 }
 
 absl::Status ModelStore::remove(const std::string& id) {
   const std::lock_guard disk_lock(disk_mutex_);
-  absl::Status failure;
-  for (int i = 0; i < kMaxTries; ++i) {
-    const absl::StatusOr<Generations> known = follow_model(id);
-    if (!known.ok()) return known.status();
-    if (!find(id).ok()) return i == 0 ? not_found(id) : absl::OkStatus();  // another server was faster
-    const absl::StatusOr<ModelFile> file = publish(directory_, id, next_generation(id, *known), {}, *known);
-    if (file.ok()) {
-      prune(directory_, id, limits_.keep_generations);
-      drop(id);
-      return absl::OkStatus();
-    }
-    failure = file.status();
-    if (!absl::IsAborted(failure)) break;
-  }
-  return failure;
+  int tries = 0;
+  const auto place = publish_next(id, [&](std::uint32_t) -> absl::StatusOr<std::string> {
+    ++tries;
+    if (!find(id).ok()) return not_found(id);
+    return std::string();
+  });
+  if (absl::IsNotFound(place.status()) && tries > 1) return absl::OkStatus();  // another server was faster
+  if (!place.ok()) return place.status();
+  prune(directory_, id, limits_.keep_generations);
+  drop(id);
+  return absl::OkStatus();
 }
 
 }  // namespace binpose::server

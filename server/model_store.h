@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -88,6 +89,8 @@ class ModelStore {
   absl::StatusOr<DirectoryContent> list_directory();
   Look look_for(const std::string& id, const Generations& generations) const;
   bool apply(const std::string& id, Look look);
+  absl::StatusOr<Place> publish_next(
+      const std::string& id, const std::function<absl::StatusOr<std::string>(std::uint32_t generation)>& content);
   std::uint32_t next_generation(const std::string& id, const Generations& known) const;
   void drop(const std::string& id);
   absl::Status check_budget(const std::string& id, std::size_t bytes) const;

@@ -7,6 +7,18 @@
 #include "client/scene.h"
 
 namespace binpose::client::cli {
+namespace {
+
+absl::Status read_params(const std::string& path, v1::DetectParams& params) {
+  const absl::StatusOr<std::string> text = read_file(path);
+  if (!text.ok()) return text.status();
+  const auto parsed = google::protobuf::util::JsonStringToMessage(*text, &params);
+  if (parsed.ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      path + " holds no DetectParams as JSON, such as {\"minScore\": 0.4}: " + std::string(parsed.message()));
+}
+
+}  // namespace
 
 void add_scan_options(CLI::App& command, ScanOptions& options) {
   command
@@ -47,19 +59,6 @@ std::string request_id_of(const std::string& scene) {
   constexpr std::size_t kMaxBytes = 256;
   return scene.size() <= kMaxBytes ? scene : scene.substr(scene.size() - kMaxBytes);
 }
-
-namespace {
-
-absl::Status read_params(const std::string& path, v1::DetectParams& params) {
-  const absl::StatusOr<std::string> text = read_file(path);
-  if (!text.ok()) return text.status();
-  const auto parsed = google::protobuf::util::JsonStringToMessage(*text, &params);
-  if (parsed.ok()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      path + " holds no DetectParams as JSON, such as {\"minScore\": 0.4}: " + std::string(parsed.message()));
-}
-
-}  // namespace
 
 absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const std::string& scene) {
   absl::StatusOr<v1::PointCloud> cloud = read_scene(scene, options.camera, options.unit);

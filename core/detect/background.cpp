@@ -1,6 +1,6 @@
 #include "core/detect/background.h"
 
-#include <algorithm>
+#include <cmath>
 
 #include "core/detect/support_plane.h"
 
@@ -9,14 +9,13 @@ namespace {
 
 /// Whether a part's surface can lie there: inside of the walls and the floor by more than `margin`. Open towards +z.
 bool inside(const OrientedBox& bin, const Eigen::Vector3d& p_scene, double margin) {
-  const Eigen::Vector3d p = bin.T_scene_box.inverse() * p_scene;
+  const Eigen::Vector3d p = bin.in_box(p_scene);
   const Eigen::Vector3d half = 0.5 * bin.size;
   return std::abs(p.x()) < half.x() - margin && std::abs(p.y()) < half.y() - margin && p.z() > margin - half.z();
 }
 
 bool is_outside(const SearchSpace& space, const Eigen::Vector3d& p_scene, double diameter, double margin) {
-  const auto near = [&](const OrientedBox& region) { return region.contains(p_scene, diameter); };
-  if (!space.regions.empty() && std::none_of(space.regions.begin(), space.regions.end(), near)) return true;
+  if (!in_a_region(space, p_scene, diameter)) return true;
   const std::optional<Plane>& plane = space.support_plane;
   if (plane && plane->normal.dot(p_scene) <= plane->offset + margin) return true;
   return space.bin_interior && !inside(*space.bin_interior, p_scene, margin);

@@ -11,19 +11,15 @@ Pose preferred(const Pose& T_scene_model, const Symmetry& symmetry, int model_in
   return best_equivalent(T_scene_model, symmetry, params.reference_orientation->toRotationMatrix().transpose());
 }
 
-/// How well the scene determines the pose, in scene axes.
+/// How well the scene determines the pose, in scene axes, told of the pose's position.
 void add_uncertainty(const Candidate& candidate, const DepthMap& map, const Model& model, const VerifyOptions& options,
                      PoseHypothesis& hypothesis) {
   const Uncertainty uncertainty =
       uncertainty_of(map, model, candidate.T_view_model, options, candidate.evidence.residual);
   Matrix6d to_scene = Matrix6d::Zero();
   to_scene.topLeftCorner<3, 3>() = to_scene.bottomRightCorner<3, 3>() = map.T_scene_view.linear();
-  // Symmetric equivalents have other origins: the motion of T's origin as turning moves it.
-  const Eigen::Vector3d shift =
-      hypothesis.T_scene_model.translation() - map.T_scene_view * candidate.T_view_model.translation().cast<double>();
-  Matrix6d to_origin = Matrix6d::Identity();
-  to_origin.topRightCorner<3, 3>() << 0, shift.z(), -shift.y(), -shift.z(), 0, shift.x(), shift.y(), -shift.x(), 0;
-  const Matrix6d J = to_origin * to_scene;
+  const Eigen::Vector3d centre = map.T_scene_view * (candidate.T_view_model.cast<double>() * model.centre);
+  const Matrix6d J = seen_from(hypothesis.T_scene_model.translation() - centre) * to_scene;
   hypothesis.covariance = J * uncertainty.covariance * J.transpose();
   for (const Twist& motion : uncertainty.free_directions) hypothesis.free_directions.emplace_back(J * motion);
 }

@@ -116,8 +116,8 @@ void add_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, 
 }
 
 /// The lower triangle, mirrored.
-Eigen::Matrix<double, 6, 6> normal_matrix(const NormalEquations& equations) {
-  Eigen::Matrix<double, 6, 6> A;
+Matrix6d normal_matrix(const NormalEquations& equations) {
+  Matrix6d A;
   for (int r = 0; r < 6; ++r) {
     for (int c = 0; c <= r; ++c) A(r, c) = A(c, r) = equations.A[r][c];
   }
@@ -125,16 +125,16 @@ Eigen::Matrix<double, 6, 6> normal_matrix(const NormalEquations& equations) {
 }
 
 /// The same with translations before rotations.
-Eigen::Matrix<double, 6, 6> by_motion(const NormalEquations& equations) {
-  const Eigen::Matrix<double, 6, 6> A = normal_matrix(equations);
-  Eigen::Matrix<double, 6, 6> swapped;
+Matrix6d by_motion(const NormalEquations& equations) {
+  const Matrix6d A = normal_matrix(equations);
+  Matrix6d swapped;
   swapped << A.bottomRightCorner<3, 3>(), A.bottomLeftCorner<3, 3>(), A.topRightCorner<3, 3>(), A.topLeftCorner<3, 3>();
   return swapped;
 }
 
 /// The step that solves the equations, damped; rotations are damped as what they do at the part's radius.
 Eigen::Matrix<float, 6, 1> solve(const NormalEquations& equations, float radius) {
-  Eigen::Matrix<double, 6, 6> A = normal_matrix(equations);
+  Matrix6d A = normal_matrix(equations);
   Eigen::Matrix<double, 6, 1> b;
   for (int r = 0; r < 6; ++r) b[r] = equations.b[r];
   const double damping = kDamping * A.diagonal().tail<3>().sum() / 3;

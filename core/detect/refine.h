@@ -22,8 +22,8 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
 /// How much the scene resists small motions of a pose: sums of J^T J over what is drawn. J: distance by motion, metres
 /// by (translation, rotation about the part's centre), view frame.
 struct Information {
-  Eigen::Matrix<double, 6, 6> surface = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 6> outline = Eigen::Matrix<double, 6, 6>::Zero();
+  Matrix6d surface = Matrix6d::Zero();
+  Matrix6d outline = Matrix6d::Zero();
   double surface_count = 0;  ///< surface points that are drawn
 };
 

@@ -101,9 +101,7 @@ Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams&
 void keep_votes_in_regions(const DepthMap& map, const SearchSpace& space, double slack, std::vector<PoseVote>& votes) {
   if (space.regions.empty()) return;
   std::erase_if(votes, [&](const PoseVote& vote) {
-    const Eigen::Vector3d centre = map.T_scene_view * vote.centre.cast<double>();
-    return std::none_of(space.regions.begin(), space.regions.end(),
-                        [&](const OrientedBox& region) { return region.contains(centre, slack); });
+    return !in_a_region(space, map.T_scene_view * vote.centre.cast<double>(), slack);
   });
 }
 

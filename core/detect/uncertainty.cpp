@@ -16,13 +16,6 @@ constexpr double kFreeOutline = 0.3;
 /// Covariances stay finite: at least so much of a point resists.
 constexpr double kLeastResistance = 1e-3;
 
-/// Cross product as a matrix.
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 }  // namespace
 
 Uncertainty uncertainty_of(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
@@ -34,15 +27,11 @@ Uncertainty uncertainty_of(const DepthMap& map, const Model& model, const Eigen:
   const auto scaled = [&](const Matrix6d& A) -> Matrix6d { return scale.asDiagonal() * A * scale.asDiagonal(); };
   const Matrix6d surface = scaled(information.surface), outline = scaled(information.outline);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> modes(surface + outline);
-  const Eigen::Vector3d arm = T_view_model.linear().cast<double>() * model.centre;  // from the model's origin
-  Matrix6d about_origin = Matrix6d::Identity();
-  about_origin.topRightCorner<3, 3>() = skew(arm);  // turning about the centre moves the origin by rotation x -arm
-
   Uncertainty uncertainty;
   const double sigma = std::max(residual, static_cast<double>(map.noise));
   for (int i = 0; i < 6; ++i) {
     const Twist mode = modes.eigenvectors().col(i);
-    const Twist motion = about_origin * scale.asDiagonal() * mode;
+    const Twist motion = scale.asDiagonal() * mode;
     uncertainty.covariance +=
         sigma * sigma / std::max(kLeastResistance, modes.eigenvalues()[i]) * motion * motion.transpose();
     const bool surface_holds = mode.dot(surface * mode) >= kFreeShare * information.surface_count;

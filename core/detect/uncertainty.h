@@ -7,12 +7,9 @@
 
 namespace binpose {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Twist = Eigen::Matrix<double, 6, 1>;  ///< a small motion: translation, then rotation vector, radians
-
 /// How well the scene determines a pose.
 struct Uncertainty {
-  /// Of a small motion T' = (translation, rotation about the model's origin) * T: metres and radians, view frame.
+  /// Of a small motion (translation, rotation about the part's centre): metres and radians, view frame.
   Matrix6d covariance = Matrix6d::Zero();
   /// Motions of the same kind that the measurement hardly resists, such as sliding along a rod of which no end is seen:
   /// a unit vector each, if rotations count as what they do at half a diameter.

@@ -150,8 +150,7 @@ std::vector<std::string> mesh_warnings(const MeshReport& report, double unseen_s
   if (unseen_share >= kMuchUnseen) {
     warnings.push_back(
         absl::StrFormat("%.0f %% of the mesh's surface can't be seen from outside. It takes time and memory but "
-                        "changes no pose; if this "
-                        "is an assembly, export its outer shape alone.",
+                        "changes no pose; if this is an assembly, export its outer shape alone.",
                         percent(unseen_share)));
   }
   if (report.share_against_neighbours >= kMuchAgainstNeighbours) {

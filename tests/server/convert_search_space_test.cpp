@@ -12,14 +12,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const google::protobuf::RepeatedPtrField<std::string>& model_ids() {
-  static const auto* ids = new google::protobuf::RepeatedPtrField<std::string>([] {
-    google::protobuf::RepeatedPtrField<std::string> names;
-    *names.Add() = "bolt";
-    *names.Add() = "gear";
-    return names;
-  }());
-  return *ids;
+google::protobuf::RepeatedPtrField<std::string> model_ids() {
+  google::protobuf::RepeatedPtrField<std::string> ids;
+  *ids.Add() = "bolt";
+  *ids.Add() = "gear";
+  return ids;
 }
 
 void set(v1::Vector3& vector, double x, double y, double z) {

@@ -22,6 +22,21 @@ DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& senso
   return map;
 }
 
+PinholeSensor bin_sensor() {
+  PinholeSensor sensor;
+  sensor.width = 320;
+  sensor.height = 240;
+  sensor.focal = 450;
+  sensor.noise = 1e-4;
+  return sensor;
+}
+
+PartScan::PartScan(const Mesh& mesh, const Pose& pose, std::vector<PlacedMesh> others)
+    : model(quick_model(mesh)), T_scene_model(pose), bodies(std::move(others)) {
+  bodies.push_back({mesh, pose});
+  map = scan_map(bodies, {}, model.diameter);
+}
+
 Eigen::Isometry3f in_view(const DepthMap& map, const Pose& T_scene_model) {
   return Eigen::Isometry3f((map.T_scene_view.inverse() * T_scene_model).matrix().cast<float>());
 }

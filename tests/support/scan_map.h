@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "core/geometry/depth_map.h"
 #include "core/model.h"
@@ -13,6 +14,19 @@ Model quick_model(const Mesh& mesh);
 
 /// A scan as detection sees it when it looks for a part of the given diameter: pixels, normals, contours.
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter);
+
+/// A sensor with the noise of a good scanner, for scenes of several parts.
+PinholeSensor bin_sensor();
+
+/// A part scanned at a pose, perhaps with something in front of it.
+struct PartScan {
+  Model model;
+  Pose T_scene_model;
+  std::vector<PlacedMesh> bodies;
+  DepthMap map;
+
+  PartScan(const Mesh& mesh, const Pose& pose, std::vector<PlacedMesh> others = {});
+};
 
 /// A pose of the scene frame in the map's view frame.
 Eigen::Isometry3f in_view(const DepthMap& map, const Pose& T_scene_model);

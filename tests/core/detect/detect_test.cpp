@@ -14,15 +14,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-testing::PinholeSensor sensor() {
-  testing::PinholeSensor s;
-  s.width = 320;
-  s.height = 240;
-  s.focal = 450;
-  s.noise = 1e-4;
-  return s;
-}
-
 /// Four blocks in poses of all kinds, of which enough shows to tell them from any other.
 std::vector<testing::PlacedMesh> four_blocks() {
   const Mesh mesh = testing::l_block();
@@ -46,7 +37,7 @@ bool right(const PoseHypothesis& found, const Pose& truth, const Model& model) {
 TEST(Detect, FindsEachPartOnceAtItsPose) {
   const std::vector<testing::PlacedMesh> bodies = four_blocks();
   const Model model = testing::quick_model(testing::l_block());
-  const DetectResult result = *search(testing::render(bodies, sensor()), model);
+  const DetectResult result = *search(testing::render(bodies, testing::bin_sensor()), model);
   ASSERT_GE(result.hypotheses.size(), 4u);
   for (std::size_t i = 0; i < 4; ++i) {
     int hits = 0;
@@ -74,7 +65,7 @@ TEST(Detect, FindsPartsOfSeveralModelsAndSaysWhich) {
       {testing::stepped_shaft(), testing::pose(100, {0.2, 1, 0}, {0.05, 0.06, 0.46})}};
   const Model block = testing::quick_model(testing::l_block()), shaft = testing::quick_model(testing::stepped_shaft());
   const Model* models[] = {&block, &shaft};
-  const DetectResult result = *detect(testing::render(bodies, sensor()), models, {}, {});
+  const DetectResult result = *detect(testing::render(bodies, testing::bin_sensor()), models, {}, {});
   ASSERT_GE(result.hypotheses.size(), 3u);
   int blocks = 0, shafts = 0;
   for (int i = 0; i < 3; ++i) {
@@ -97,7 +88,7 @@ TEST(Detect, FindsPartsOfSeveralModelsAndSaysWhich) {
 TEST(Detect, GivesPosesInTheFrameOfTheCloud) {
   const std::vector<testing::PlacedMesh> bodies = four_blocks();
   const Model model = testing::quick_model(testing::l_block());
-  PointCloud cloud = testing::render(bodies, sensor());
+  PointCloud cloud = testing::render(bodies, testing::bin_sensor());
   const Pose T_robot_sensor = testing::pose(170, {1, 0.1, 0.3}, {0.5, -0.2, 1.1});
   for (Eigen::Vector3f& p : cloud.points) p = (T_robot_sensor * p.cast<double>()).cast<float>();
   cloud.sensor_position = T_robot_sensor.translation();
@@ -115,7 +106,7 @@ TEST(Detect, GivesPosesInTheFrameOfTheCloud) {
 TEST(Detect, DoesNotNeedTheOrderOfThePoints) {
   const std::vector<testing::PlacedMesh> bodies = four_blocks();
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud grid = testing::render(bodies, sensor());
+  const PointCloud grid = testing::render(bodies, testing::bin_sensor());
   PointCloud loose;
   for (std::size_t i = 0; i < grid.points.size(); ++i) {
     loose.points.push_back(grid.points[i * 7919 % grid.points.size()]);
@@ -135,20 +126,20 @@ TEST(Detect, DoesNotNeedTheOrderOfThePoints) {
 
 TEST(Detect, FindsNothingOnABareFloor) {
   const Model model = testing::quick_model(testing::l_block());
-  const absl::StatusOr<DetectResult> result = search(testing::render({}, sensor()), model);
+  const absl::StatusOr<DetectResult> result = search(testing::render({}, testing::bin_sensor()), model);
   ASSERT_TRUE(result.ok());
   EXPECT_TRUE(result->hypotheses.empty());
 }
 
 TEST(Detect, DoesNotFindAPartThatIsNotThere) {
   const Model shaft = testing::quick_model(testing::stepped_shaft());
-  const DetectResult result = *search(testing::render(four_blocks(), sensor()), shaft);
+  const DetectResult result = *search(testing::render(four_blocks(), testing::bin_sensor()), shaft);
   for (const PoseHypothesis& h : result.hypotheses) EXPECT_LT(h.score, 0.6);
 }
 
 TEST(Detect, CountsWhatItDid) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   const DetectStats stats = search(cloud, model)->stats;
   EXPECT_EQ(stats.point_count, cloud.points.size());
   EXPECT_GT(stats.start_point_count, 100u);
@@ -162,7 +153,7 @@ TEST(Detect, CountsWhatItDid) {
 
 TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   DetectParams params;
   params.min_score = 1;
   EXPECT_TRUE(search(cloud, model, params)->hypotheses.empty());
@@ -173,7 +164,7 @@ TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
 
 TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   const DetectResult all = *search(cloud, model);
   ASSERT_GE(all.hypotheses.size(), 2U);
   DetectParams params;
@@ -194,7 +185,7 @@ TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
 
 TEST(Detect, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   const DetectResult once = *search(cloud, model);
   for (const int threads : {1, 2, 4}) {
     RunControl control;
@@ -214,7 +205,7 @@ TEST(Detect, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
 
 TEST(Detect, IsCancelledBeforeOrWhileItWorks) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   std::stop_source source;
   RunControl control;
   control.stop = source.get_token();
@@ -231,7 +222,7 @@ TEST(Detect, IsCancelledBeforeOrWhileItWorks) {
 
 TEST(Detect, AtItsDeadlineAnswersWithWhatItHas) {
   const Model model = testing::quick_model(testing::l_block());
-  const PointCloud cloud = testing::render(four_blocks(), sensor());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
   RunControl control;
   control.deadline = std::chrono::steady_clock::now();
   const absl::StatusOr<DetectResult> result = search(cloud, model, {}, control);
@@ -243,14 +234,14 @@ TEST(Detect, ReturnsNoMoreThanAskedFor) {
   const Model model = testing::quick_model(testing::l_block());
   DetectParams params;
   params.max_results = 2;
-  const DetectResult result = *search(testing::render(four_blocks(), sensor()), model, params);
+  const DetectResult result = *search(testing::render(four_blocks(), testing::bin_sensor()), model, params);
   EXPECT_EQ(result.hypotheses.size(), 2u);
   EXPECT_EQ(result.stats.stop_reason, StopReason::kMaxResults);
 }
 
 TEST(Detect, RefusesBadParametersAndNoModel) {
   const Model model = testing::quick_model(testing::hexagon());
-  const PointCloud cloud = testing::render({}, sensor());
+  const PointCloud cloud = testing::render({}, testing::bin_sensor());
   DetectParams params;
   params.max_results = 0;
   EXPECT_EQ(search(cloud, model, params).status().code(), absl::StatusCode::kInvalidArgument);

@@ -17,16 +17,9 @@ struct Error {
   double degrees, metres;
 };
 
-struct Scan {
-  Mesh mesh;
-  Model model;
-  Pose T_scene_model;
-  DepthMap map;
+struct Scan : testing::PartScan {
+  using PartScan::PartScan;
 
-  Scan(Mesh part, const Pose& pose) : mesh(std::move(part)), model(testing::quick_model(mesh)), T_scene_model(pose) {
-    const testing::PlacedMesh bodies[] = {{mesh, pose}};
-    map = testing::scan_map(bodies, {}, model.diameter);
-  }
   RefineOptions options() const {
     RefineOptions options;
     options.first_gate = static_cast<float>(0.08 * model.diameter);

@@ -13,15 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-testing::PinholeSensor sensor() {
-  testing::PinholeSensor s;
-  s.width = 320;
-  s.height = 240;
-  s.focal = 450;
-  s.noise = 1e-4;
-  return s;
-}
-
 const Pose kLeft = testing::pose(40, {1, 0.5, 0.2}, {-0.08, 0, 0.44});
 const Pose kRight = testing::pose(110, {0.3, 1, -0.5}, {0.08, 0, 0.45});
 
@@ -37,8 +28,9 @@ class Steering : public ::testing::Test {
   }
 
   const Model model_ = testing::quick_model(testing::l_block());
-  const PointCloud cloud_ = testing::render(
-      std::vector<testing::PlacedMesh>{{testing::l_block(), kLeft}, {testing::l_block(), kRight}}, sensor());
+  const PointCloud cloud_ =
+      testing::render(std::vector<testing::PlacedMesh>{{testing::l_block(), kLeft}, {testing::l_block(), kRight}},
+                      testing::bin_sensor());
 };
 
 OrientedBox box_around(const Vector3d& centre, double size) {
@@ -118,7 +110,8 @@ TEST(SteeringSymmetry, TheEquivalentNearestToTheReferenceIsAnsweredAndTheOthersA
   const Model model = testing::quick_model(testing::hexagon());
   ASSERT_EQ(model.symmetry.discrete.size(), 12u);
   const Pose truth = testing::pose(35, {1, 0.3, 0.1}, {0, 0, 0.44});
-  const PointCloud cloud = testing::render(std::vector<testing::PlacedMesh>{{testing::hexagon(), truth}}, sensor());
+  const PointCloud cloud =
+      testing::render(std::vector<testing::PlacedMesh>{{testing::hexagon(), truth}}, testing::bin_sensor());
   const Model* models[] = {&model};
   DetectParams params;
   params.list_equivalents = true;

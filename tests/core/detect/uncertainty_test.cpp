@@ -14,15 +14,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Scan {
-  Model model;
-  Pose T_scene_model;
-  DepthMap map;
+struct Scan : testing::PartScan {
+  using PartScan::PartScan;
 
-  Scan(const Mesh& mesh, const Pose& pose) : model(testing::quick_model(mesh)), T_scene_model(pose) {
-    const testing::PlacedMesh bodies[] = {{mesh, pose}};
-    map = testing::scan_map(bodies, {}, model.diameter);
-  }
   Uncertainty uncertainty() const {
     return uncertainty_of(map, model, testing::in_view(map, T_scene_model), final_verification(map, model), 1e-4);
   }

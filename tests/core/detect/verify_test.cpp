@@ -13,18 +13,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A part scanned at a pose, perhaps with something in front of it.
-struct Scan {
-  Model model;
-  Pose T_scene_model;
-  std::vector<testing::PlacedMesh> bodies;
-  DepthMap map;
+struct Scan : testing::PartScan {
+  using PartScan::PartScan;
 
-  Scan(const Mesh& mesh, const Pose& pose, std::vector<testing::PlacedMesh> others = {})
-      : model(testing::quick_model(mesh)), T_scene_model(pose), bodies(std::move(others)) {
-    bodies.push_back({mesh, pose});
-    map = testing::scan_map(bodies, {}, model.diameter);
-  }
   VerifyOptions options() const {
     VerifyOptions options;
     options.tolerance = static_cast<float>(0.012 * model.diameter);
