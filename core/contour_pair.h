@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/geometry/depth_map.h"
+#include "core/heap_bytes.h"
 
 namespace binpose {
 
@@ -71,6 +72,7 @@ class ContourTable {
       }
     }
   }
+  std::size_t memory_bytes() const { return heap_bytes(votes_) + heap_bytes(first_) + heap_bytes(entries_); }
 
  private:
   static constexpr int kDistanceBins = 32;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/heap_bytes.h"
+
 namespace binpose {
 namespace {
 
@@ -37,6 +39,15 @@ void derive(Model& model, const RunControl& control) {
   if (control.interrupted()) return;
   model.contour_table = ContourTable(model.contour_points, model.contour_pairs, model.contour_weights,
                                      model.centre.cast<float>(), static_cast<float>(model.diameter));
+}
+
+std::size_t memory_bytes(const Model& model) {
+  return sizeof(model) + heap_bytes(model.surface) + heap_bytes(model.visibility) + heap_bytes(model.outlines) +
+         heap_bytes(model.pair_points) + heap_bytes(model.pairs) + heap_bytes(model.pair_weights) +
+         heap_bytes(model.contour_points) + heap_bytes(model.contour_pairs) + heap_bytes(model.contour_weights) +
+         heap_bytes(model.similar_poses) + heap_bytes(model.telling_points) + heap_bytes(model.telling_visibility) +
+         heap_bytes(model.viewpoints) + heap_bytes(model.visible_from) + heap_bytes(model.view_area) +
+         model.pair_table.memory_bytes() + model.contour_table.memory_bytes();
 }
 
 }  // namespace binpose

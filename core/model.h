@@ -55,4 +55,7 @@ struct Model {
 /// Fills the derived members from the stored ones; not all of them when `control` interrupts.
 void derive(Model& model, const RunControl& control = {});
 
+/// What a model takes of memory, near enough: without its warnings and the allocator's own.
+std::size_t memory_bytes(const Model& model);
+
 }  // namespace binpose

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/heap_bytes.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
@@ -47,6 +48,7 @@ class PairTable {
     return {blocks_.data() + first_block_[slot], blocks_.data() + first_block_[slot + 1]};
   }
   const Vote& vote(std::uint32_t pair) const { return votes_[pair]; }
+  std::size_t memory_bytes() const { return heap_bytes(first_block_) + heap_bytes(blocks_) + heap_bytes(votes_); }
 
  private:
   FeatureBins bins_;

@@ -49,7 +49,8 @@ void add_limit_options(CLI::App& app, Config& config) {
   app.add_option("--request-memory-mib", config.request_memory_mib,
                  "Requests that may wait or be computed at a time, MiB; more are refused")
       ->check(CLI::Range(1, 1'000'000));
-  app.add_option("--models-memory-mib", config.models_memory_mib, "Model files that are served in all, MiB")
+  app.add_option("--models-memory-mib", config.models_memory_mib,
+                 "Memory for models, MiB; beyond it those that were not used longest leave until they are wanted")
       ->check(CLI::Range(1, 1'000'000));
   app.add_option("--keep-generations", config.keep_generations,
                  "Generations of a model that stay in the directory, the one that is served included")

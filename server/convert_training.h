@@ -8,7 +8,7 @@
 #include "core/geometry/mesh.h"
 #include "core/params.h"
 #include "core/train/train.h"
-#include "server/model_store.h"
+#include "server/model_envelope.h"
 
 namespace binpose::server {
 

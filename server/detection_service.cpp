@@ -60,7 +60,7 @@ absl::StatusOr<RunControl> limit_time(const v1::DetectRequest& request, Clock::t
 }
 
 absl::StatusOr<std::vector<std::shared_ptr<const StoredModel>>> find_models(const v1::DetectRequest& request,
-                                                                            const ModelStore& models) {
+                                                                            ModelStore& models) {
   std::vector<std::shared_ptr<const StoredModel>> found;
   for (const std::string& id : request.model_ids()) {
     absl::StatusOr<std::shared_ptr<const StoredModel>> model = models.find(id);
@@ -72,7 +72,7 @@ absl::StatusOr<std::vector<std::shared_ptr<const StoredModel>>> find_models(cons
 
 }  // namespace
 
-absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, const ModelStore& models,
+absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, ModelStore& models,
                                               const RunControl& control) {
   if (absl::Status status = check_request(request); !status.ok()) return status;
   const auto stored = find_models(request, models);

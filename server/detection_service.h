@@ -10,7 +10,7 @@
 namespace binpose::server {
 
 /// Convert, look up, detect, convert. Errors: those of DetectResponse.error.
-absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, const ModelStore& models,
+absl::StatusOr<v1::DetectResponse> find_parts(const v1::DetectRequest& request, ModelStore& models,
                                               const RunControl& control);
 
 /// binpose.v1.DetectionService; its frames are bytes until a thread of the pool decodes them.

@@ -42,6 +42,11 @@ prometheus::Counter& counter(prometheus::Registry& registry, const char* name, c
   return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add({});
 }
 
+/// Counts up to what was counted elsewhere.
+void advance_to(prometheus::Counter& counter, std::size_t count) {
+  counter.Increment(std::max(0.0, static_cast<double>(count) - counter.Value()));
+}
+
 }  // namespace
 
 Metrics::Metrics()
@@ -56,8 +61,11 @@ Metrics::Metrics()
       training_cancel_seconds_(cancels(*registry_, "training")),
       points_(counter(*registry_, "binpose_detect_points_total", "Measured points in searched clouds.")),
       hypotheses_(counter(*registry_, "binpose_detect_hypotheses_total", "Hypotheses that were answered.")),
-      models_(gauge(*registry_, "binpose_models_loaded", "Models that are served.")),
-      model_bytes_(gauge(*registry_, "binpose_models_bytes", "Bytes of the files of the models that are served.")),
+      models_served_(gauge(*registry_, "binpose_models_served", "Models that are served.")),
+      models_loaded_(gauge(*registry_, "binpose_models_loaded", "Models that are in memory.")),
+      model_bytes_(gauge(*registry_, "binpose_models_bytes", "Bytes of memory that models take.")),
+      model_loads_(counter(*registry_, "binpose_model_loads_total",
+                           "Times that a model was wanted that had left memory for others.")),
       model_directory_age_(
           gauge(*registry_, "binpose_model_directory_age_seconds", "Seconds since the model directory was last read.")),
       waiting_detections_(waiting(*registry_, "detections")),
@@ -126,6 +134,15 @@ void Metrics::count_search(const google::protobuf::RepeatedPtrField<std::string>
     model_series_.at(hypothesis.model_id()).found->Increment();
   }
 }
+
+void Metrics::set_models(const ModelCache::Usage& usage) {
+  models_served_.Set(static_cast<double>(usage.models));
+  models_loaded_.Set(static_cast<double>(usage.in_memory));
+  model_bytes_.Set(static_cast<double>(usage.bytes));
+  advance_to(model_loads_, usage.loads);
+}
+
+void Metrics::set_skipped_model_files(std::size_t files) { advance_to(skipped_model_files_, files); }
 
 void Metrics::keep_models(const std::set<std::string>& ids) {
   const std::lock_guard lock(mutex_);

@@ -16,6 +16,7 @@
 
 #include "absl/status/status.h"
 #include "binpose/v1/detection_service.pb.h"
+#include "server/model_cache.h"
 
 namespace binpose::server {
 
@@ -35,6 +36,9 @@ class Metrics {
   /// Counts for each of the models that it was searched for, and what was found of it.
   void count_search(const google::protobuf::RepeatedPtrField<std::string>& model_ids,
                     const v1::DetectResponse& response);
+  /// Notes how many models there are and what they take.
+  void set_models(const ModelCache::Usage& usage);
+  void set_skipped_model_files(std::size_t files);
   /// Drops the series of all models but these.
   void keep_models(const std::set<std::string>& ids);
   /// Notes a training that ended well; without the time that it waited.
@@ -44,15 +48,12 @@ class Metrics {
   /// Notes how long after its cancel a request ended, and whether in "queue", "compute" or "training".
   void observe_cancel(std::string_view place, double seconds);
 
-  prometheus::Gauge& models() { return models_; }
-  prometheus::Gauge& model_bytes() { return model_bytes_; }
   prometheus::Gauge& model_directory_age() { return model_directory_age_; }
   prometheus::Gauge& waiting_detections() { return waiting_detections_; }
   prometheus::Gauge& waiting_trainings() { return waiting_trainings_; }
   prometheus::Gauge& request_bytes() { return request_bytes_; }
   prometheus::Gauge& resident_bytes() { return resident_bytes_; }
   prometheus::Gauge& streams() { return streams_; }
-  prometheus::Counter& skipped_model_files() { return skipped_model_files_; }
   std::shared_ptr<prometheus::Registry> registry() const { return registry_; }
 
  private:
@@ -72,8 +73,10 @@ class Metrics {
   prometheus::Histogram& training_cancel_seconds_;
   prometheus::Counter& points_;
   prometheus::Counter& hypotheses_;
-  prometheus::Gauge& models_;
+  prometheus::Gauge& models_served_;
+  prometheus::Gauge& models_loaded_;
   prometheus::Gauge& model_bytes_;
+  prometheus::Counter& model_loads_;
   prometheus::Gauge& model_directory_age_;
   prometheus::Gauge& waiting_detections_;
   prometheus::Gauge& waiting_trainings_;

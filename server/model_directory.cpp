@@ -124,6 +124,11 @@ std::filesystem::path model_path(const std::filesystem::path& directory, std::st
   return directory / file_name(id, generation);
 }
 
+std::uint32_t generation_of(const std::filesystem::path& model_path) {
+  const auto parsed = parse_name(model_path.filename().string());
+  return parsed ? parsed->second : kUnnumbered;
+}
+
 absl::Status make_model_directory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);

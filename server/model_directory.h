@@ -41,6 +41,8 @@ struct DirectoryContent {
 };
 
 std::filesystem::path model_path(const std::filesystem::path& directory, std::string_view id, std::uint32_t generation);
+/// The generation that the name of such a path says.
+std::uint32_t generation_of(const std::filesystem::path& model_path);
 
 /// Makes a model directory, or takes the one that is there. Errors: INTERNAL.
 absl::Status make_model_directory(const std::filesystem::path& directory);

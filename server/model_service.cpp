@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/clock.h"
 #include "server/convert_shape.h"
@@ -25,13 +26,12 @@ void finish(grpc::ServerUnaryReactor* reactor, Metrics& metrics, Method method, 
 
 absl::Status get_model(const ModelStore& models, const std::string& id, v1::Model& response) {
   if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
-  const auto stored = models.find(id);
-  if (!stored.ok()) return stored.status();
-  response = to_proto(**stored);
-  return absl::OkStatus();
+  absl::StatusOr<v1::Model> model = models.describe(id);
+  if (model.ok()) response = *std::move(model);
+  return model.status();
 }
 
-absl::Status get_model_shape(const ModelStore& models, const std::string& id, v1::GetModelShapeResponse& response) {
+absl::Status get_model_shape(ModelStore& models, const std::string& id, v1::GetModelShapeResponse& response) {
   if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   const auto stored = models.find(id);
   if (!stored.ok()) return stored.status();
@@ -76,12 +76,9 @@ grpc::ServerUnaryReactor* ModelService::GetModel(grpc::CallbackServerContext* co
 grpc::ServerUnaryReactor* ModelService::GetModelShape(grpc::CallbackServerContext* context,
                                                       const v1::GetModelShapeRequest* request,
                                                       v1::GetModelShapeResponse* response) {
-  const Clock::time_point arrival = Clock::now();
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  absl::Status status = backend_.tokens.check(*context, Role::kDetect);
-  if (status.ok()) status = get_model_shape(backend_.models, request->id(), *response);
-  finish(reactor, backend_.metrics, Method::kGetModelShape, arrival, status);
-  return reactor;
+  return answer_on_pool(*context, Role::kDetect, Method::kGetModelShape, [this, id = request->id(), response] {
+    return get_model_shape(backend_.models, id, *response);
+  });
 }
 
 grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* context,
@@ -91,7 +88,7 @@ grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* 
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const absl::Status allowed = backend_.tokens.check(*context, Role::kDetect);
   if (allowed.ok()) {
-    for (const auto& stored : backend_.models.list()) *response->add_models() = to_proto(*stored);
+    for (v1::Model& model : backend_.models.list()) *response->add_models() = std::move(model);
   }
   finish(reactor, backend_.metrics, Method::kListModels, arrival, allowed);
   return reactor;
@@ -100,18 +97,22 @@ grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* ModelService::DeleteModel(grpc::CallbackServerContext* context,
                                                     const v1::DeleteModelRequest* request,
                                                     v1::DeleteModelResponse* /*response*/) {
+  return answer_on_pool(*context, Role::kTrain, Method::kDeleteModel,
+                        [this, id = request->id()] { return delete_model(backend_, id); });
+}
+
+grpc::ServerUnaryReactor* ModelService::answer_on_pool(grpc::CallbackServerContext& context, Role role, Method method,
+                                                       std::function<absl::Status()> answer) {
   const Clock::time_point arrival = Clock::now();
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (absl::Status allowed = backend_.tokens.check(*context, Role::kTrain); !allowed.ok()) {
-    finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, allowed);
-    return reactor;
+  grpc::ServerUnaryReactor* reactor = context.DefaultReactor();
+  absl::Status admitted = backend_.tokens.check(context, role);
+  if (admitted.ok()) {
+    const auto call = std::make_shared<Drain::Call>(backend_.drain);
+    admitted = backend_.detections.submit([this, call, reactor, arrival, method, answer = std::move(answer)] {
+      finish(reactor, backend_.metrics, method, arrival, contain_exceptions(answer));
+    });
   }
-  const auto call = std::make_shared<Drain::Call>(backend_.drain);
-  // On the pool, because it waits for the disk.
-  const absl::Status admitted = backend_.detections.submit([this, call, reactor, arrival, id = request->id()] {
-    finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, delete_model(backend_, id));
-  });
-  if (!admitted.ok()) finish(reactor, backend_.metrics, Method::kDeleteModel, arrival, admitted);
+  if (!admitted.ok()) finish(reactor, backend_.metrics, method, arrival, admitted);
   return reactor;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "binpose/v1/model_service.grpc.pb.h"
 #include "server/backend.h"
 
@@ -26,6 +28,10 @@ class ModelService final : public v1::ModelService::CallbackService {
                                         v1::DeleteModelResponse* response) override;
 
  private:
+  /// Ends a unary call with what `answer` returns, which may wait for the disk.
+  grpc::ServerUnaryReactor* answer_on_pool(grpc::CallbackServerContext& context, Role role, Method method,
+                                           std::function<absl::Status()> answer);
+
   Backend backend_;
 };
 

@@ -21,20 +21,20 @@ namespace {
 /// Tries to put a generation before giving up: as many as others may put meanwhile.
 constexpr int kMaxTries = 100;
 
-absl::Status not_found(std::string_view id) {
-  return absl::NotFoundError(absl::StrFormat("There is no model '%s'.", id));
-}
-
-absl::StatusOr<StoredModel> load_file(const std::filesystem::path& path, std::string_view id,
-                                      std::uint32_t generation) {
+/// The generation is the one in the file's name, if it has one.
+absl::StatusOr<StoredModel> load_file(const std::filesystem::path& path, const std::string& id) {
   const absl::StatusOr<std::string> bytes = read_file(path, kMaxModelFileBytes);
   if (!bytes.ok()) return bytes.status();
   absl::StatusOr<StoredModel> stored = open_envelope(id, *bytes);
+  const std::uint32_t generation = generation_of(path);
   if (stored.ok() && generation != kUnnumbered) stored->generation = generation;
   return stored;
 }
 
 }  // namespace
+
+ModelStore::ModelStore(std::filesystem::path directory, const ModelLimits& limits)
+    : directory_(std::move(directory)), limits_(limits), cache_(limits.memory_bytes, load_file) {}
 
 /// What came of looking for the newest generation of a model that can be used.
 struct ModelStore::Look {
@@ -80,6 +80,10 @@ bool ModelStore::follow_directory(int threads) {
   const std::lock_guard disk_lock(disk_mutex_);
   const absl::StatusOr<DirectoryContent> content = list_directory();
   if (!content.ok()) return false;
+  std::erase_if(skipped_, [](const auto& skipped) {
+    std::error_code ignored;
+    return !std::filesystem::exists(skipped.first, ignored);
+  });
   for (const auto& [name, file] : content->others) {
     skip(directory_ / name, file, "its name is not that of a model, '<id>@<generation>.model' or '<id>.model'");
   }
@@ -93,17 +97,21 @@ bool ModelStore::follow_directory(int threads) {
     const auto known = seen_.find(id);
     if (known == seen_.end() || known->second != generations) changed.push_back(id);
   }
-  std::vector<Look> looks(changed.size());
-  parallel_for(static_cast<int>(changed.size()), threads, [&](int i) {
-    const auto index = static_cast<std::size_t>(i);
-    looks[index] = look_for(changed[index], content->models.at(changed[index]));
-  });
+  // Some at a time: all at once may be more than memory holds.
+  const std::size_t batch = static_cast<std::size_t>(threads) * 4;
+  std::vector<Look> looks(batch);
   bool is_settled = true;
-  for (std::size_t i = 0; i < changed.size(); ++i) {
-    if (apply(changed[i], std::move(looks[i]))) {
-      seen_[changed[i]] = content->models.at(changed[i]);
-    } else {
-      is_settled = false;
+  for (std::size_t begin = 0; begin < changed.size(); begin += batch) {
+    const std::size_t count = std::min(batch, changed.size() - begin);
+    parallel_for(static_cast<int>(count), threads, [&](int i) {
+      const std::string& id = changed[begin + static_cast<std::size_t>(i)];
+      looks[static_cast<std::size_t>(i)] = look_for(id, content->models.at(id));
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::string& id = changed[begin + i];
+      const bool is_done = apply(id, std::move(looks[i]));
+      if (is_done) seen_[id] = content->models.at(id);
+      is_settled = is_settled && is_done;
     }
   }
   return is_settled;
@@ -153,7 +161,7 @@ ModelStore::Look ModelStore::look_for(const std::string& id, const Generations& 
     const bool is_served = current != places_.end() && current->second.generation == generation;
     if (is_served && current->second.file == file) return look;
     const std::filesystem::path path = model_path(directory_, id, generation);
-    absl::StatusOr<StoredModel> loaded = contain_exceptions([&] { return load_file(path, id, generation); });
+    absl::StatusOr<StoredModel> loaded = contain_exceptions([&] { return load_file(path, id); });
     if (loaded.ok()) {
       look.model = *std::move(loaded);
       look.place = {generation, file};
@@ -173,37 +181,24 @@ bool ModelStore::apply(const std::string& id, Look look) {
   for (const Look::Fault& fault : look.faults) skip(fault.path, fault.file, fault.reason);
   if (look.is_gone) drop(id);
   if (!look.model) return look.is_settled;
-  if (absl::Status status = check_budget(id, look.model->file_bytes); !status.ok()) {
+  if (absl::Status status = cache_.check_size(id, look.model->model); !status.ok()) {
     skip(model_path(directory_, id, look.place.generation), look.place.file, std::string(status.message()));
   } else {
-    places_[id] = look.place;
-    serve(std::make_shared<const StoredModel>(*std::move(look.model)));
+    serve(std::make_shared<const StoredModel>(*std::move(look.model)), look.place);
   }
   return look.is_settled;
 }
 
-void ModelStore::serve(std::shared_ptr<const StoredModel> stored) {
-  const std::lock_guard lock(mutex_);
-  models_[stored->id] = std::move(stored);
+void ModelStore::serve(std::shared_ptr<const StoredModel> stored, const Place& place) {
+  places_[stored->id] = place;
+  const std::filesystem::path file = model_path(directory_, stored->id, place.generation);
+  cache_.put(std::move(stored), file);
 }
 
 void ModelStore::drop(const std::string& id) {
   seen_.erase(id);
   places_.erase(id);
-  const std::lock_guard lock(mutex_);
-  if (models_.erase(id) > 0) spdlog::info("{} is gone: its files were removed", id);
-}
-
-absl::Status ModelStore::check_budget(const std::string& id, std::size_t bytes) const {
-  constexpr double kMiB = 1 << 20;
-  const auto previous = find(id);
-  const std::size_t others = total_bytes() - (previous.ok() ? (*previous)->file_bytes : 0);
-  if (others + bytes <= limits_.total_bytes) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrFormat("Model '%s' of %.1f MiB would come to %.1f MiB of others, and --models-memory-mib is %.0f; "
-                      "delete some, or raise it.",
-                      id, static_cast<double>(bytes) / kMiB, static_cast<double>(others) / kMiB,
-                      static_cast<double>(limits_.total_bytes) / kMiB));
+  if (cache_.erase(id)) spdlog::info("{} is gone: its files were removed", id);
 }
 
 /// Logs and counts a file once, until it changes.
@@ -214,37 +209,20 @@ void ModelStore::skip(const std::filesystem::path& path, const ModelFile& file, 
   ++skipped_files_;
 }
 
-std::size_t ModelStore::total_bytes() const {
-  const std::lock_guard lock(mutex_);
-  std::size_t bytes = 0;
-  for (const auto& [id, model] : models_) bytes += model->file_bytes;
-  return bytes;
-}
-
-absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::find(std::string_view id) const {
-  const std::lock_guard lock(mutex_);
-  const auto found = models_.find(id);
-  if (found == models_.end()) return not_found(id);
-  return found->second;
-}
-
-std::vector<std::shared_ptr<const StoredModel>> ModelStore::list() const {
-  const std::lock_guard lock(mutex_);
-  std::vector<std::shared_ptr<const StoredModel>> models;
-  for (const auto& [id, model] : models_) models.push_back(model);
-  return models;
-}
-
-std::size_t ModelStore::size() const {
-  const std::lock_guard lock(mutex_);
-  return models_.size();
+absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::find(const std::string& id) {
+  auto found = cache_.find(id);
+  if (!absl::IsUnavailable(found.status())) return found;
+  // Its file may have been replaced and pruned since the last look.
+  const std::lock_guard disk_lock(disk_mutex_);
+  if (absl::Status status = follow_model(id).status(); !status.ok()) return status;
+  return cache_.find(id);
 }
 
 std::uint32_t ModelStore::next_generation(const std::string& id, const Generations& known) const {
   const std::uint32_t newest = known.empty() ? 0 : known.rbegin()->first;
-  const auto served = find(id);  // of an unnumbered file, only its content tells the generation
+  const auto served = describe(id);  // of an unnumbered file, only its content tells the generation
   const auto put = put_.find(id);
-  return 1 + std::max({newest, served.ok() ? (*served)->generation : 0, put != put_.end() ? put->second : 0});
+  return 1 + std::max({newest, served.ok() ? served->generation() : 0, put != put_.end() ? put->second : 0});
 }
 
 /// Puts the next generation of a model into the directory, again while other servers are faster.
@@ -273,18 +251,17 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::st
   stored->create_time = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   stored->model = std::move(model);
   stored->content_hash = content_hash(stored->model);
+  if (absl::Status status = cache_.check_size(id, stored->model); !status.ok()) return status;
   const std::lock_guard disk_lock(disk_mutex_);
   const auto place = publish_next(id, [&](std::uint32_t generation) -> absl::StatusOr<std::string> {
     stored->generation = generation;
     std::string bytes = seal_envelope(*stored);
     stored->file_bytes = bytes.size();
-    if (absl::Status status = check_budget(id, bytes.size()); !status.ok()) return status;
     return bytes;
   });
   if (!place.ok()) return place.status();
-  places_[id] = *place;
   put_[id] = place->generation;
-  serve(stored);
+  serve(stored, *place);
   prune(directory_, id, limits_.keep_generations);
   return stored;
 }
@@ -294,7 +271,7 @@ absl::Status ModelStore::remove(const std::string& id) {
   int tries = 0;
   const auto place = publish_next(id, [&](std::uint32_t) -> absl::StatusOr<std::string> {
     ++tries;
-    if (!find(id).ok()) return not_found(id);
+    if (absl::Status status = describe(id).status(); !status.ok()) return status;
     return std::string();
   });
   if (absl::IsNotFound(place.status()) && tries > 1) return absl::OkStatus();  // another server was faster

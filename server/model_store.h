@@ -17,36 +17,26 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/model.h"
 #include "server/clock.h"
+#include "server/model_cache.h"
 #include "server/model_directory.h"
 
 namespace binpose::server {
-
-/// A model as it is kept and served; immutable.
-struct StoredModel {
-  std::string id;
-  std::uint32_t generation = 0;  ///< counts up from 1 with every training of the ID
-  std::chrono::sys_seconds create_time;
-  std::string content_hash;  ///< binpose::content_hash(model)
-  std::size_t file_bytes = 0;
-  Model model;
-};
 
 /// Largest model file that is read.
 inline constexpr std::size_t kMaxModelFileBytes = std::size_t{256} << 20;
 
 /// What may be held of models.
 struct ModelLimits {
-  std::size_t total_bytes = std::size_t{1} << 30;  ///< sum of the sizes of the files
-  std::size_t keep_generations = 2;                ///< of a model in the directory, the one that is served included
-  int load_threads = 1;                            ///< how many files are read at once by open()
+  std::size_t memory_bytes = std::size_t{1} << 30;  ///< of those in memory
+  std::size_t keep_generations = 2;                 ///< of a model in the directory, the one that is served included
+  int load_threads = 1;                             ///< how many files are read at once by open()
 };
 
 /// The models by ID, in memory and in a directory that other servers may share. What put() and remove() acknowledge
 /// survives a power cut. What another server puts or removes is followed within 2 seconds; a file that cannot be used
-/// never takes the place of a model that is served, and while the directory is away all are. Thread-safe; readers never
-/// wait for the disk.
+/// never takes the place of a model that is served. All are in memory as long as they fit there, and served while the
+/// directory is away. Thread-safe; reading waits for the disk only for a model that did not fit (see ModelCache).
 class ModelStore {
  public:
   /// Loads the models of `directory`, which is made if it is missing. A file that is torn, foreign or unreadable is
@@ -54,11 +44,13 @@ class ModelStore {
   static absl::StatusOr<std::unique_ptr<ModelStore>> open(const std::filesystem::path& directory,
                                                           const ModelLimits& limits = {});
 
-  /// NOT_FOUND, naming the ID.
-  absl::StatusOr<std::shared_ptr<const StoredModel>> find(std::string_view id) const;
+  /// Errors: NOT_FOUND, naming the ID; UNAVAILABLE (it had left memory, and cannot be read).
+  absl::StatusOr<std::shared_ptr<const StoredModel>> find(const std::string& id);
+  /// Errors: NOT_FOUND, naming the ID.
+  absl::StatusOr<v1::Model> describe(std::string_view id) const { return cache_.describe(id); }
   /// Ordered by ID.
-  std::vector<std::shared_ptr<const StoredModel>> list() const;
-  std::size_t size() const;
+  std::vector<v1::Model> list() const { return cache_.list(); }
+  ModelCache::Usage usage() const { return cache_.usage(); }
 
   /// Saves a model as the next generation and then, only then, serves it in place of the one before. Errors: INTERNAL
   /// (not saved), UNAVAILABLE (the directory is away), RESOURCE_EXHAUSTED (over ModelLimits); the one before stays.
@@ -69,8 +61,6 @@ class ModelStore {
 
   /// Times that a file could not be used.
   std::size_t skipped_files() const { return skipped_files_; }
-  /// Sum of the sizes of the files that are served.
-  std::size_t total_bytes() const;
   /// Seconds since the directory was last read; large while it is away.
   double directory_age() const;
 
@@ -82,8 +72,7 @@ class ModelStore {
   };
   struct Look;
 
-  ModelStore(std::filesystem::path directory, const ModelLimits& limits)
-      : directory_(std::move(directory)), limits_(limits) {}
+  ModelStore(std::filesystem::path directory, const ModelLimits& limits);
   bool follow_directory(int threads);
   absl::StatusOr<Generations> follow_model(const std::string& id);
   absl::StatusOr<DirectoryContent> list_directory();
@@ -93,24 +82,22 @@ class ModelStore {
       const std::string& id, const std::function<absl::StatusOr<std::string>(std::uint32_t generation)>& content);
   std::uint32_t next_generation(const std::string& id, const Generations& known) const;
   void drop(const std::string& id);
-  absl::Status check_budget(const std::string& id, std::size_t bytes) const;
-  void serve(std::shared_ptr<const StoredModel> stored);
+  void serve(std::shared_ptr<const StoredModel> stored, const Place& place);
   void skip(const std::filesystem::path& path, const ModelFile& file, std::string_view reason);
   void watch(const std::stop_token& stop);
 
   const std::filesystem::path directory_;
   const ModelLimits limits_;
+  ModelCache cache_;  ///< what is served
   std::atomic<std::size_t> skipped_files_ = 0;
   std::atomic<Clock::time_point> last_look_ = Clock::now();  ///< when the directory was last read
-  std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change; before mutex_
+  std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change
   std::map<std::string, Generations, std::less<>> seen_;   ///< that were dealt with
   std::map<std::string, std::uint32_t, std::less<>> put_;  ///< generations that this server put last
   std::map<std::string, Place, std::less<>> places_;       ///< of the models that are served
   std::map<std::string, ModelFile> skipped_;               ///< files that were logged already, by path
   bool is_away_ = false;                                   ///< the directory
-  mutable std::mutex mutex_;                               ///< guards models_
-  std::map<std::string, std::shared_ptr<const StoredModel>, std::less<>> models_;
-  std::jthread watcher_;  ///< last, so that it ends before the rest goes
+  std::jthread watcher_;                                   ///< last, so that it ends before the rest goes
 };
 
 }  // namespace binpose::server

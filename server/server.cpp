@@ -64,7 +64,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const Config& config) {
   if (absl::Status status = server->load(); !status.ok()) return status;
   if (absl::Status status = server->listen(); !status.ok()) return status;
   server->is_ready_ = true;
-  spdlog::info("serving {} models from {} on {}", server->models_->size(), config.model_dir.string(),
+  spdlog::info("serving {} models from {} on {}", server->models_->usage().models, config.model_dir.string(),
                server->address());
   return server;
 }
@@ -84,7 +84,7 @@ Server::~Server() {
 absl::Status Server::load() {
   if (absl::Status status = tokens_.load(config_.token_file); !status.ok()) return status;
   absl::StatusOr<std::unique_ptr<ModelStore>> models =
-      ModelStore::open(config_.model_dir, {.total_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20,
+      ModelStore::open(config_.model_dir, {.memory_bytes = static_cast<std::size_t>(config_.models_memory_mib) << 20,
                                            .keep_generations = static_cast<std::size_t>(config_.keep_generations),
                                            .load_threads = config_.threads});
   if (!models.ok()) return models.status();
@@ -121,14 +121,12 @@ void Server::update_metrics() {
   metrics_.request_bytes().Set(static_cast<double>(requests_.used()));
   metrics_.resident_bytes().Set(resident_bytes());
   if (!is_ready_) return;
-  metrics_.models().Set(static_cast<double>(models_->size()));
+  metrics_.set_models(models_->usage());
   std::set<std::string> served;
-  for (const auto& model : models_->list()) served.insert(model->id);
+  for (const v1::Model& model : models_->list()) served.insert(model.id());
   metrics_.keep_models(served);
-  metrics_.model_bytes().Set(static_cast<double>(models_->total_bytes()));
   metrics_.model_directory_age().Set(models_->directory_age());
-  prometheus::Counter& skipped = metrics_.skipped_model_files();
-  skipped.Increment(std::max(0.0, static_cast<double>(models_->skipped_files()) - skipped.Value()));
+  metrics_.set_skipped_model_files(models_->skipped_files());
 }
 
 absl::Status Server::listen() {
