@@ -17,8 +17,9 @@ inline constexpr std::chrono::seconds kMaxDecodeTime(10);
 ///
 /// Errors: those of `decode`; RESOURCE_EXHAUSTED, naming `field` and the limit.
 template <class Decode>
-auto decode_in_time(std::string_view field, const RunControl& control, Decode&& decode) -> decltype(decode(control)) {
-  const auto end = std::chrono::steady_clock::now() + kMaxDecodeTime;
+auto decode_in_time(std::string_view field, const RunControl& control, Decode&& decode,
+                    std::chrono::seconds limit = kMaxDecodeTime) -> decltype(decode(control)) {
+  const auto end = std::chrono::steady_clock::now() + limit;
   RunControl limited = control;
   limited.deadline = std::min(end, control.deadline.value_or(end));
   auto decoded = std::forward<Decode>(decode)(limited);
@@ -26,7 +27,7 @@ auto decode_in_time(std::string_view field, const RunControl& control, Decode&& 
     return absl::ResourceExhaustedError(
         absl::StrFormat("%s takes more than %d s to read; that is the limit. Send fewer points or triangles, or binary "
                         "numbers.",
-                        field, kMaxDecodeTime.count()));
+                        field, limit.count()));
   }
   return decoded;
 }

@@ -1,12 +1,19 @@
 #include "server/convert_cloud.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
+
+#include "server/decode_time.h"
 
 namespace binpose::server {
 namespace {
+
+using ::testing::HasSubstr;
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -86,6 +93,18 @@ TEST(ToCloud, TheSensorPositionIsInTheCloudsUnit) {
   EXPECT_EQ(to_cloud(message)->sensor_position, Eigen::Vector3d::Zero());
   message.mutable_sensor_position()->set_z(-500);
   EXPECT_TRUE(to_cloud(message)->sensor_position.isApprox(Eigen::Vector3d(0, 0, -0.5)));
+}
+
+TEST(DecodeInTime, EndsWhatTakesLongerThanTheLimitAndNamesIt) {
+  const auto decode = [](const RunControl& control) -> absl::StatusOr<int> {
+    while (!control.interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return control.status();
+  };
+  const auto endless = decode_in_time("cloud", {}, decode, std::chrono::seconds(1));
+  EXPECT_EQ(endless.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(endless.status().message()), HasSubstr("cloud takes more than 1 s to read"));
+  const RunControl hurried = {.deadline = std::chrono::steady_clock::now() + std::chrono::milliseconds(5)};
+  EXPECT_EQ(decode_in_time("cloud", hurried, decode).status().code(), absl::StatusCode::kDeadlineExceeded);
 }
 
 }  // namespace

@@ -126,8 +126,9 @@ class MetricsTest : public ::testing::Test {
   RunningServer& start() {
     Config config = test_config(directory_.path());
     config.metrics = "127.0.0.1:0";
-    return server_.emplace(config);
+    return start(config);
   }
+  RunningServer& start(const Config& config) { return server_.emplace(config); }
   const std::filesystem::path& model_dir() const { return directory_.path(); }
   const std::string& address() { return server_->server().metrics_address(); }
 
@@ -140,6 +141,20 @@ class MetricsTest : public ::testing::Test {
   TemporaryDirectory directory_;
   std::optional<RunningServer> server_;
 };
+
+TEST_F(MetricsTest, SayThatTheServerIsNotReadyWhileItDrainsAndStillTakesCalls) {
+  Config config = test_config(model_dir());
+  config.metrics = "127.0.0.1:0";
+  config.drain_delay_seconds = 2;
+  RunningServer& server = start(config);
+  ASSERT_TRUE(server.train(train_request("block")).ok());
+  std::jthread stopping([&] { server.server().stop(); });
+  std::string ready;
+  for (int i = 0; i < 100 && ready.find("503") == std::string::npos; ++i) ready = http_get(address(), "/readyz");
+  EXPECT_THAT(ready, HasSubstr("503"));
+  EXPECT_FALSE(server.detect({detect_request("1", "block")}).front().has_error());
+  EXPECT_THAT(http_get(address(), "/healthz"), HasSubstr("200 OK"));
+}
 
 TEST_F(MetricsTest, CountRequestsByMethodAndCodeAndTimeTheStages) {
   RunningServer& server = start();

@@ -52,6 +52,40 @@ TEST(Uncertainty, APlateIsHeldByItsRimAndSlidesWithoutIt) {
   }
 }
 
+TEST(Uncertainty, IsAboutWhatRefinementErrsByOverManyScans) {
+  constexpr int kScans = 40;
+  constexpr double kNoise = 3e-4;
+  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  testing::PinholeSensor sensor = testing::bin_sensor();
+  sensor.noise = kNoise;
+  const RefineOptions options = {.first_gate = static_cast<float>(0.03 * scan.model.diameter),
+                                 .last_gate = static_cast<float>(0.03 * scan.model.diameter),
+                                 .most_points = 2000};
+  std::vector<Twist> errors;
+  Matrix6d told = Matrix6d::Zero();
+  for (int i = 0; i < kScans; ++i) {
+    sensor.seed = static_cast<std::uint64_t>(i) + 1;
+    const DepthMap map = testing::scan_map(scan.bodies, sensor, scan.model.diameter);
+    const Eigen::Isometry3f truth = testing::in_view(map, scan.T_scene_model);
+    const Eigen::Isometry3f found = refine(map, scan.model, truth, options);
+    const Eigen::AngleAxisf turn(Eigen::Matrix3f(found.linear() * truth.linear().transpose()));
+    const Eigen::Vector3f centre = scan.model.centre.cast<float>();
+    Twist error;
+    error << (found * centre - truth * centre).cast<double>(), (turn.angle() * turn.axis()).cast<double>();
+    errors.push_back(error);
+    told += uncertainty_of(map, scan.model, found, final_verification(map, scan.model), kNoise).covariance / kScans;
+  }
+  Twist mean = Twist::Zero();
+  for (const Twist& error : errors) mean += error / kScans;
+  Matrix6d seen = Matrix6d::Zero();
+  for (const Twist& error : errors) seen += (error - mean) * (error - mean).transpose() / (kScans - 1);
+  for (int k = 0; k < 6; ++k) {
+    const double ratio = std::sqrt(told(k, k) / seen(k, k));
+    EXPECT_GT(ratio, 0.4) << k;
+    EXPECT_LT(ratio, 2.5) << k;
+  }
+}
+
 TEST(Uncertainty, AnErrorOfTwiceTheSizeHasFourTimesTheCovariance) {
   const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   const auto with = [&](double residual) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/geometry/normals.h"
+#include "tests/scenes/random.h"
 #include "tests/support/ray_cast.h"
 #include "tests/support/shapes.h"
 
@@ -69,6 +70,61 @@ TEST(Contours, AreFoundByTheirPixel) {
     EXPECT_EQ(map.contours[map.contour_at[i]].position, map.points[i]);
   }
   EXPECT_EQ(count, map.contours.size());
+}
+
+/// The rule of find_contours() pixel by pixel, without its short cut.
+std::vector<ContourPoint> slow_contours(const DepthMap& map, float step, Unmeasured unmeasured) {
+  const auto ends = [&](int u, int v, int du, int dv) {
+    const int from = v * map.width + u;
+    for (int k = 1; k <= 5; ++k) {
+      const int column = u + k * du, row = v + k * dv;
+      if (column < 0 || row < 0 || column >= map.width || row >= map.height) break;
+      const int to = row * map.width + column;
+      if (!map.measured(to)) continue;
+      const Vector3f way = map.points[to] - map.points[from];
+      return map.normals[from].dot(way) < -step && way.z() > 0;
+    }
+    return unmeasured == Unmeasured::kFar;
+  };
+  std::vector<ContourPoint> contours;
+  for (int v = 0; v < map.height; ++v) {
+    for (int u = 0; u < map.width; ++u) {
+      if (!map.has_normal(v * map.width + u)) continue;
+      Vector3f outward = Vector3f::Zero();
+      for (int du = -1; du <= 1; ++du) {
+        for (int dv = -1; dv <= 1; ++dv) {
+          const bool is_direction = du != 0 || dv != 0;
+          if (is_direction && ends(u, v, du, dv)) {
+            outward += Vector3f(static_cast<float>(du), static_cast<float>(dv), 0).normalized();
+          }
+        }
+      }
+      if (outward.squaredNorm() < 0.5F) continue;
+      const int i = v * map.width + u;
+      contours.push_back({map.points[i], map.normals[i], outward.normalized()});
+    }
+  }
+  return contours;
+}
+
+TEST(Contours, AreThoseOfTheRuleAppliedToEachPixelOfARaggedScan) {
+  for (const Unmeasured unmeasured : {Unmeasured::kUnknown, Unmeasured::kFar}) {
+    DepthMap map = block(0.47, unmeasured);
+    scenes::Random random(5);
+    for (int k = 0; k < 4000; ++k) {  // holes, and points out of place by about the step
+      const auto i = static_cast<std::size_t>(random.uniform(0, static_cast<double>(map.points.size()) - 1));
+      map.points[i].z() = k % 2 == 0 ? 0 : map.points[i].z() + static_cast<float>(random.uniform(-2, 2)) * kStep;
+      if (k % 2 == 0) map.normals[i].setZero();
+    }
+    find_contours(map, kStep, unmeasured);
+    const std::vector<ContourPoint> slow = slow_contours(map, kStep, unmeasured);
+    ASSERT_EQ(map.contours.size(), slow.size());
+    EXPECT_GT(slow.size(), 1000);
+    for (std::size_t i = 0; i < slow.size(); ++i) {
+      EXPECT_EQ(map.contours[i].position, slow[i].position);
+      EXPECT_TRUE(map.contours[i].outward.isApprox(slow[i].outward, 1e-4F));
+    }
+  }
 }
 
 TEST(Contours, AreTheSameOnAnyNumberOfThreads) {
