@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <iostream>
 
 #include "client/cli/command.h"
@@ -20,8 +22,16 @@ Examples:
 Exit codes: 0 done; 1 refused by the server, or a scene failed; 2 wrong usage; 3 a file cannot be read;
 4 no server, or no answer in time.)";
 
+/// Keeps the memory of a scan for the next one: to have it from the system anew costs more than to send the scan.
+void keep_memory_of_scans() {
+  constexpr int kMiB = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, 32 * kMiB);
+  mallopt(M_TRIM_THRESHOLD, 64 * kMiB);
+}
+
 /// What a subcommand did not foresee ends here, as a sentence: a library that throws, memory that runs out.
 int run(int argc, char** argv) {
+  keep_memory_of_scans();
   CLI::App app("Finds trained parts in point clouds: the command-line client of binpose-server.", "binpose");
   app.footer(kFooter);
   app.require_subcommand(1);
