@@ -8,10 +8,10 @@ run="libabsl20220623 libcivetweb1 libgrpc++1.51 liblzf1 libpng16-16 libprometheu
 build="cmake g++ ninja-build
   libabsl-dev libcivetweb-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
-test="chromium chromium-driver clang-format clang-tidy curl fish git haproxy iproute2 libbullet-dev libembree-dev
-  libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev openssl pkgconf prometheus python3 python3-grpcio
-  python3-matplotlib python3-numpy python3-pil python3-protobuf python3-selenium python3-setuptools python3-yaml
-  shellcheck systemd zsh"
+test="chromium chromium-driver clang-format clang-tidy curl fish git haproxy iproute2 libbenchmark-dev libbullet-dev
+  libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev openssl pkgconf prometheus python3
+  python3-grpcio python3-matplotlib python3-numpy python3-pil python3-protobuf python3-selenium python3-setuptools
+  python3-yaml shellcheck systemd zsh"
 fuzz="clang libclang-rt-14-dev"
 # Node.js from elsewhere brings its own npm and conflicts with Debian's.
 command -v npm >/dev/null || build="$build npm ca-certificates"

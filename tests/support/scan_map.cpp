@@ -14,12 +14,16 @@ Model quick_model(const Mesh& mesh) {
   return train(mesh, params, {}).value();
 }
 
-DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
-  const SensorView view = sensor_view(render(bodies, sensor)).value();
+DepthMap scan_map(const PointCloud& cloud, double diameter) {
+  const SensorView view = sensor_view(cloud).value();
   DepthMap map = depth_map(view, std::max(0.014 * diameter, 1.2 * view.spacing));
   estimate_normals(map, 1);
   find_contours(map, static_cast<float>(0.03 * diameter), Unmeasured::kUnknown);
   return map;
+}
+
+DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
+  return scan_map(render(bodies, sensor), diameter);
 }
 
 PinholeSensor bin_sensor() {

@@ -13,6 +13,7 @@ namespace binpose::testing {
 Model quick_model(const Mesh& mesh);
 
 /// A scan as detection sees it when it looks for a part of the given diameter: pixels, normals, contours.
+DepthMap scan_map(const PointCloud& cloud, double diameter);
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter);
 
 /// A sensor with the noise of a good scanner, for scenes of several parts.
