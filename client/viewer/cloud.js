@@ -1,23 +1,25 @@
 // The scan as shaded points.
 import * as THREE from "three";
 
-const AREA_SAMPLES = 20000;
+const SAMPLES = 20000; // points that tell the extent of all
+const TINT = [0.3, 0.36, 0.44];
 
 /** Points of a cloud as wire.js gives it, with their middle and radius in `userData`. A part's surface hides those that
  * lie less than `tolerance` in front of it: they are the measured part itself. */
 export function cloudPoints(stage, cloud, sensor, tolerance) {
   const { xyz } = cloud;
-  const kept = [];
-  for (let i = 0; i < xyz.length / 3; ++i) {
-    if (Number.isFinite(xyz[3 * i] + xyz[3 * i + 1] + xyz[3 * i + 2])) kept.push(i);
-  }
+  const kept = measured(xyz);
   const shade = cloud.columns > 1 ? shadeBySlope(cloud, sensor) : shadeByDepth(xyz, kept, sensor);
   const position = new Float32Array(3 * kept.length);
   const colour = new Float32Array(3 * kept.length);
-  kept.forEach((from, to) => {
-    position.set(xyz.subarray(3 * from, 3 * from + 3), 3 * to);
-    colour.set([0.3 * shade(from), 0.36 * shade(from), 0.44 * shade(from)], 3 * to);
-  });
+  for (let to = 0; to < kept.length; ++to) {
+    const from = kept[to];
+    const brightness = shade(from);
+    for (let k = 0; k < 3; ++k) {
+      position[3 * to + k] = xyz[3 * from + k];
+      colour[3 * to + k] = TINT[k] * brightness;
+    }
+  }
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
   geometry.setAttribute("color", new THREE.BufferAttribute(colour, 3));
@@ -27,6 +29,16 @@ export function cloudPoints(stage, cloud, sensor, tolerance) {
   const points = new THREE.Points(geometry, material);
   Object.assign(points.userData, { centre, radius });
   return points;
+}
+
+/** Indices of the points with three finite coordinates. */
+function measured(xyz) {
+  const kept = new Uint32Array(xyz.length / 3);
+  let count = 0;
+  for (let i = 0; i < kept.length; ++i) {
+    if (Number.isFinite(xyz[3 * i] + xyz[3 * i + 1] + xyz[3 * i + 2])) kept[count++] = i;
+  }
+  return kept.subarray(0, count);
 }
 
 /** Draws points that much farther away than they are, at the same place of the picture. */
@@ -55,7 +67,8 @@ function shadeBySlope({ xyz, columns }, sensor) {
 function shadeByDepth(xyz, kept, sensor) {
   const at = new THREE.Vector3();
   const depth = (i) => at.fromArray(xyz, 3 * i).distanceTo(sensor);
-  const depths = kept.map(depth).sort((a, b) => a - b);
+  const step = Math.max(1, Math.floor(kept.length / SAMPLES));
+  const depths = Float64Array.from({ length: Math.ceil(kept.length / step) }, (_, i) => depth(kept[step * i])).sort();
   const [near, far] = [depths[Math.floor(0.02 * depths.length)], depths[Math.floor(0.98 * depths.length)]];
   return (i) => 0.9 - 0.65 * Math.min(1, Math.max(0, (depth(i) - near) / (far - near || 1)));
 }
@@ -64,7 +77,7 @@ function shadeByDepth(xyz, kept, sensor) {
 function extentOf(position) {
   const count = position.length / 3;
   if (count === 0) return { centre: new THREE.Vector3(), radius: 100, spacing: 1 };
-  const step = Math.max(1, Math.floor(count / AREA_SAMPLES));
+  const step = Math.max(1, Math.floor(count / SAMPLES));
   const [low, high] = [new THREE.Vector3(), new THREE.Vector3()];
   for (let axis = 0; axis < 3; ++axis) {
     const values = [];
