@@ -27,6 +27,7 @@ constexpr double kCoarseShare = 0.6;
 constexpr std::size_t kMostRefined = 300;
 constexpr int kRefinements = 4;  // at each gate
 constexpr std::size_t kRefinePoints = 150;
+constexpr std::size_t kCoarseTargets = 1500;
 constexpr std::size_t kPolishPoints = 1000;
 constexpr std::size_t kGlancedPoints = 400;  // a first judgement
 constexpr std::size_t kJudgedPoints = 4000;
@@ -174,8 +175,11 @@ class TurnSearch {
         surface_(surface),
         diameter_(static_cast<float>(diameter)),
         on_surface_(static_cast<float>(kOnSurface) * diameter_),
-        by_place_(surface, static_cast<float>(0.7 * kReach) * diameter_),
+        sparse_(surface.begin(), surface.begin() + std::min<std::ptrdiff_t>(kCoarseTargets, std::ssize(surface))),
+        sparsely_by_place_(sparse_, static_cast<float>(0.7 * kReach) * diameter_),
+        by_place_(surface, static_cast<float>(0.35 * kReach) * diameter_),
         finely_by_place_(dense, on_surface_) {
+    sparsely_by_place_.insert_all();
     by_place_.insert_all();
     finely_by_place_.insert_all();
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -187,10 +191,16 @@ class TurnSearch {
   std::vector<RatedTurn> find(const RunControl& control) const {
     std::vector<RatedTurn> found = {{Eigen::Isometry3f::Identity(), 1}};
     const Nearness nearness(surface_, diameter_);
+    std::vector<Eigen::Isometry3f> settled;
     for (const RatedTurn& coarse : coarse_turns(nearness, surface_, middle_, radius(), control)) {
       if (control.interrupted()) break;
       const float far = static_cast<float>(0.7 * kReach) * diameter_;
-      const Eigen::Isometry3f near_by = settle(by_place_, surface_, kRefinePoints, far, coarse.T);
+      const Eigen::Isometry3f near_by = settle(sparsely_by_place_, sparse_, kRefinePoints, far, coarse.T);
+      const bool repeats = std::any_of(settled.begin(), settled.end(), [&](const Eigen::Isometry3f& other) {
+        return same_turn(other, near_by, radius(), same_pose() / 3);
+      });
+      if (repeats) continue;
+      settled.push_back(near_by);
       add(settle(by_place_, surface_, kRefinePoints, far / 2, near_by), found);
     }
     complete(found, control);
@@ -301,7 +311,8 @@ class TurnSearch {
   const std::vector<SurfacePoint>& dense_;
   const std::vector<SurfacePoint>& surface_;
   float diameter_, on_surface_;
-  CellIndex by_place_, finely_by_place_;
+  std::vector<SurfacePoint> sparse_;  ///< evenly spread all the same
+  CellIndex sparsely_by_place_, by_place_, finely_by_place_;
   Eigen::Vector3f middle_;
 };
 

@@ -15,26 +15,43 @@ namespace {
 /// Votes for one side over votes for the other, from which on the sides are told apart.
 constexpr double kClearMajority = 1.25;
 
+/// Positions coordinate by coordinate, so that all of them are projected by vector instructions.
+struct Positions {
+  Eigen::ArrayXf x, y, z;
+
+  explicit Positions(std::span<const SurfacePoint> points)
+      : x(static_cast<Eigen::Index>(points.size())), y(x.size()), z(x.size()) {
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const Eigen::Vector3f& p = points[static_cast<std::size_t>(i)].position;
+      x[i] = p.x();
+      y[i] = p.y();
+      z[i] = p.z();
+    }
+  }
+};
+
+/// How far along a direction; for one point and for many to the same last bit.
+float along(const Eigen::Vector3f& direction, const Eigen::Vector3f& p) {
+  return direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
+}
+Eigen::ArrayXf along(const Eigen::Vector3f& direction, const Positions& p) {
+  return direction.x() * p.x + direction.y() * p.y + direction.z() * p.z;
+}
+
 /// The nearest surface in each cell of a plane across the view. Depths count towards the viewer.
 class ProjectionPlane {
  public:
-  ProjectionPlane(std::span<const SurfacePoint> dense, const Eigen::Vector3f& viewpoint, float cell)
+  ProjectionPlane(const Positions& dense, const Eigen::Vector3f& viewpoint, float cell)
       : towards_viewer_(viewpoint), right_(viewpoint.unitOrthogonal()), up_(viewpoint.cross(right_)), cell_(cell) {
-    Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = Eigen::Array2f::Constant(-INFINITY);
-    std::vector<Eigen::Array2f> places;
-    places.reserve(dense.size());
-    for (const SurfacePoint& point : dense) {
-      const Eigen::Array2f& at = places.emplace_back(across(point.position));
-      low = low.min(at);
-      high = high.max(at);
-    }
-    origin_ = low;
-    width_ = static_cast<int>((high[0] - low[0]) / cell) + 1;
-    const int height = static_cast<int>((high[1] - low[1]) / cell) + 1;
+    const Eigen::ArrayXf right = along(right_, dense), up = along(up_, dense), depth = along(towards_viewer_, dense);
+    if (depth.size() == 0) return;
+    origin_ = {right.minCoeff(), up.minCoeff()};
+    width_ = static_cast<int>((right.maxCoeff() - origin_[0]) / cell) + 1;
+    const int height = static_cast<int>((up.maxCoeff() - origin_[1]) / cell) + 1;
     nearest_.assign(static_cast<std::size_t>(width_) * height, -INFINITY);
-    for (std::size_t i = 0; i < dense.size(); ++i) {
-      float& nearest = nearest_[index(places[i])];
-      nearest = std::max(nearest, towards_viewer_.dot(dense[i].position));
+    for (Eigen::Index i = 0; i < depth.size(); ++i) {
+      float& nearest = nearest_[index(Eigen::Array2f(right[i], up[i]))];
+      nearest = std::max(nearest, depth[i]);
     }
   }
 
@@ -42,19 +59,18 @@ class ProjectionPlane {
   bool reaches(const SurfacePoint& point) const {
     const float cosine = std::abs(towards_viewer_.dot(point.normal));
     const float slope = std::sqrt(std::max(0.0F, 1 - cosine * cosine)) / std::max(cosine, kGrazingCosine);
-    return towards_viewer_.dot(point.position) >= nearest_[index(point.position)] - cell_ * (0.3F + 1.2F * slope);
+    return along(towards_viewer_, point.position) >= nearest_[index(point.position)] - cell_ * (0.3F + 1.2F * slope);
   }
 
   /// Whether the point is the one that its cell shows.
   bool is_nearest(const SurfacePoint& point) const {
-    return towards_viewer_.dot(point.position) >= nearest_[index(point.position)];
+    return along(towards_viewer_, point.position) >= nearest_[index(point.position)];
   }
 
   float cosine(const SurfacePoint& point) const { return towards_viewer_.dot(point.normal); }
 
  private:
-  Eigen::Array2f across(const Eigen::Vector3f& p) const { return {right_.dot(p), up_.dot(p)}; }
-  std::size_t index(const Eigen::Vector3f& p) const { return index(across(p)); }
+  std::size_t index(const Eigen::Vector3f& p) const { return index(Eigen::Array2f(along(right_, p), along(up_, p))); }
   /// Points lie inside the plane's extent, as all are points of the surface that it was made from.
   std::size_t index(const Eigen::Array2f& place) const {
     const Eigen::Array2i c = ((place - origin_) / cell_).cast<int>();
@@ -65,7 +81,7 @@ class ProjectionPlane {
   Eigen::Vector3f towards_viewer_, right_, up_;
   Eigen::Array2f origin_;
   float cell_;
-  int width_;
+  int width_ = 0;
   std::vector<float> nearest_;
 };
 
@@ -75,11 +91,12 @@ std::vector<ViewMask> visibility(std::span<const SurfacePoint> dense, std::span<
                                  std::span<const Eigen::Vector3f> viewpoints, double cell, const RunControl& control) {
   const int words = static_cast<int>((viewpoints.size() + 63) / 64);
   std::vector<ViewMask> masks(points.size(), ViewMask(words, 0));
+  const Positions positions(dense);
   // A word of 64 viewpoints is one thread's, so that no two write to the same place.
   parallel_for(words, control.threads, [&](int word) {
     const int last = std::min(static_cast<int>(viewpoints.size()), 64 * (word + 1));
     for (int k = 64 * word; k < last && !control.interrupted(); ++k) {
-      const ProjectionPlane plane(dense, viewpoints[k], static_cast<float>(cell));
+      const ProjectionPlane plane(positions, viewpoints[k], static_cast<float>(cell));
       for (std::size_t i = 0; i < points.size(); ++i) {
         if (plane.cosine(points[i]) >= kGrazingCosine && plane.reaches(points[i])) {
           masks[i][word] |= std::uint64_t{1} << (k % 64);
@@ -111,9 +128,10 @@ std::vector<bool> seen_from_behind(std::span<const SurfacePoint> dense, std::spa
   };
   std::unordered_map<std::uint32_t, Votes> by_shell;
   Votes all;
+  const Positions positions(dense);
   for (const Eigen::Vector3f& viewpoint : viewpoints) {
     if (control.interrupted()) break;
-    const ProjectionPlane plane(dense, viewpoint, static_cast<float>(cell));
+    const ProjectionPlane plane(positions, viewpoint, static_cast<float>(cell));
     for (std::size_t i = 0; i < dense.size(); ++i) {
       const float cosine = plane.cosine(dense[i]);
       // Where the surface is seen edge on, either side of a thin wall may win.
