@@ -6,13 +6,22 @@ const AXIS_COLOURS = { x: "#ff6b6b", y: "#6bd66b", z: "#6ba8ff" };
 const FIELD_OF_VIEW = 32; // degrees
 const SCALE_BAR_PIXELS = 140; // at most
 
+/** Smooth edges cost nothing on a graphics card, and a second of each picture of a large cloud without one. */
+function hasGraphicsCard() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const names = gl?.getExtension("WEBGL_debug_renderer_info");
+  const renderer = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext(); // browsers keep few
+  return !/swiftshader|llvmpipe|softpipe/i.test(renderer);
+}
+
 export class Stage {
   /** `pole` is the direction that counts as up; `front` the one from which things are looked at first. */
   constructor({ pole, front }) {
     this.host = document.getElementById("stage");
     this.pole = pole.clone().normalize();
     this.front = front.clone().normalize();
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ antialias: hasGraphicsCard(), preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.host.prepend(this.renderer.domElement);
     this.canvas = this.renderer.domElement;
