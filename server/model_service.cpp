@@ -27,8 +27,9 @@ void finish(grpc::ServerUnaryReactor* reactor, Metrics& metrics, Method method, 
 absl::Status get_model(const ModelStore& models, const std::string& id, v1::Model& response) {
   if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   absl::StatusOr<v1::Model> model = models.describe(id);
-  if (model.ok()) response = *std::move(model);
-  return model.status();
+  if (!model.ok()) return model.status();
+  response = *std::move(model);
+  return absl::OkStatus();
 }
 
 absl::Status get_model_shape(ModelStore& models, const std::string& id, v1::GetModelShapeResponse& response) {

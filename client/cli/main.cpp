@@ -1,5 +1,6 @@
 #include <malloc.h>
 
+#include <cstdlib>
 #include <iostream>
 
 #include "client/cli/command.h"
@@ -22,6 +23,9 @@ Examples:
 Exit codes: 0 done; 1 refused by the server, or a scene failed; 2 wrong usage; 3 a file cannot be read;
 4 no server, or no answer in time.)";
 
+/// What gRPC writes to stderr of its own accord says nothing that our errors do not; who wants it sets the variable.
+void silence_grpc() { ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0); }
+
 /// Keeps the memory of a scan for the next one: to have it from the system anew costs more than to send the scan.
 void keep_memory_of_scans() {
   constexpr int kMiB = 1 << 20;
@@ -31,6 +35,7 @@ void keep_memory_of_scans() {
 
 /// What a subcommand did not foresee ends here, as a sentence: a library that throws, memory that runs out.
 int run(int argc, char** argv) {
+  silence_grpc();
   keep_memory_of_scans();
   CLI::App app("Finds trained parts in point clouds: the command-line client of binpose-server.", "binpose");
   app.footer(kFooter);
