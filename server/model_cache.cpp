@@ -130,6 +130,13 @@ std::vector<v1::Model> ModelCache::list() const {
   return models;
 }
 
+std::set<std::string> ModelCache::ids() const {
+  const std::lock_guard lock(mutex_);
+  std::set<std::string> ids;
+  for (const auto& [id, entry] : entries_) ids.insert(ids.end(), id);
+  return ids;
+}
+
 ModelCache::Usage ModelCache::usage() const {
   const std::lock_guard lock(mutex_);
   return usage_;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,6 +43,7 @@ class ModelCache {
   absl::StatusOr<v1::Model> describe(std::string_view id) const;
   /// Ordered by ID.
   std::vector<v1::Model> list() const;
+  std::set<std::string> ids() const;
 
   struct Usage {
     std::size_t models = 0;     ///< that are served

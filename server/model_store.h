@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -50,6 +51,7 @@ class ModelStore {
   absl::StatusOr<v1::Model> describe(std::string_view id) const { return cache_.describe(id); }
   /// Ordered by ID.
   std::vector<v1::Model> list() const { return cache_.list(); }
+  std::set<std::string> ids() const { return cache_.ids(); }
   ModelCache::Usage usage() const { return cache_.usage(); }
 
   /// Saves a model as the next generation and then, only then, serves it in place of the one before. Errors: INTERNAL

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <set>
 #include <thread>
 #include <utility>
 
@@ -122,9 +121,7 @@ void Server::update_metrics() {
   metrics_.resident_bytes().Set(resident_bytes());
   if (!is_ready_) return;
   metrics_.set_models(models_->usage());
-  std::set<std::string> served;
-  for (const v1::Model& model : models_->list()) served.insert(model.id());
-  metrics_.keep_models(served);
+  metrics_.keep_models(models_->ids());
   metrics_.model_directory_age().Set(models_->directory_age());
   metrics_.set_skipped_model_files(models_->skipped_files());
 }

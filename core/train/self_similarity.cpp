@@ -16,6 +16,8 @@ namespace {
 
 // Lengths as shares of the diameter.
 constexpr double kReach = 0.1;  // of the coarse search
+constexpr double kFirstGate = 0.7 * kReach;
+constexpr double kSecondGate = kFirstGate / 2;
 constexpr double kGridCell = 0.025;
 constexpr double kOnSurface = 0.014;  // a point this near to the surface is on it
 constexpr double kSamePose = 0.06;    // turns that move no corner of the box farther apart are one
@@ -176,8 +178,8 @@ class TurnSearch {
         diameter_(static_cast<float>(diameter)),
         on_surface_(static_cast<float>(kOnSurface) * diameter_),
         sparse_(surface.begin(), surface.begin() + std::min<std::ptrdiff_t>(kCoarseTargets, std::ssize(surface))),
-        sparsely_by_place_(sparse_, static_cast<float>(0.7 * kReach) * diameter_),
-        by_place_(surface, static_cast<float>(0.35 * kReach) * diameter_),
+        sparsely_by_place_(sparse_, first_gate()),
+        by_place_(surface, second_gate()),
         finely_by_place_(dense, on_surface_) {
     sparsely_by_place_.insert_all();
     by_place_.insert_all();
@@ -194,14 +196,13 @@ class TurnSearch {
     std::vector<Eigen::Isometry3f> settled;
     for (const RatedTurn& coarse : coarse_turns(nearness, surface_, middle_, radius(), control)) {
       if (control.interrupted()) break;
-      const float far = static_cast<float>(0.7 * kReach) * diameter_;
-      const Eigen::Isometry3f near_by = settle(sparsely_by_place_, sparse_, kRefinePoints, far, coarse.T);
+      const Eigen::Isometry3f near_by = settle(sparsely_by_place_, sparse_, kRefinePoints, first_gate(), coarse.T);
       const bool repeats = std::any_of(settled.begin(), settled.end(), [&](const Eigen::Isometry3f& other) {
         return same_turn(other, near_by, radius(), same_pose() / 3);
       });
       if (repeats) continue;
       settled.push_back(near_by);
-      add(settle(by_place_, surface_, kRefinePoints, far / 2, near_by), found);
+      add(settle(by_place_, surface_, kRefinePoints, second_gate(), near_by), found);
     }
     complete(found, control);
     std::stable_sort(found.begin() + 1, found.end(),
@@ -227,6 +228,9 @@ class TurnSearch {
   const Eigen::Vector3f& middle() const { return middle_; }
 
  private:
+  float first_gate() const { return static_cast<float>(kFirstGate) * diameter_; }
+  float second_gate() const { return static_cast<float>(kSecondGate) * diameter_; }
+
   double share(const Eigen::Isometry3f& T, std::size_t most) const {
     return share_on_surface(finely_by_place_, surface_, T, most, on_surface_);
   }

@@ -152,9 +152,11 @@ void detect_parts(State& state, const Bench& bench) {
   count(state, "points", bench.view.points.size());
 }
 
+/// @param bench  outlives the benchmarks' runs.
 void add_all(const Bench& bench) {
   const auto add = [&bench](const char* name, void (*stage)(State&, const Bench&)) {
-    return benchmark::RegisterBenchmark(name, stage, bench)->Unit(benchmark::kMillisecond);
+    return benchmark::RegisterBenchmark(name, [&bench, stage](State& state) { stage(state, bench); })
+        ->Unit(benchmark::kMillisecond);
   };
   add("train", train_part);
   add("sensor_view", view_cloud);
@@ -176,7 +178,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   const std::string parts = argc > 2 ? argv[1] : "tests/data/parts";
   const std::string scene = argc > 2 ? argv[2] : "tests/data/scenes/bearing_support_01";
-  add_all(make_bench(parts, scene));
+  const Bench bench = make_bench(parts, scene);
+  add_all(bench);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }
