@@ -18,7 +18,9 @@ enum class PairSelection {
   kDistinctiveness,  ///< 1 - Ph [Eq. 4]: rare features first
   kObservability,    ///< Obs [Eq. 6]: pairs seen from many viewpoints first
   kIntegration,      ///< w1 Obs + w2 (1 - Ph) [Eq. 7]
-  kSignalToNoise,    ///< Obs / sqrt(Ph): expected true votes over the noise of the false ones
+  /// Obs / sqrt(Ph), Ph among what is seen: expected true votes over the noise of the false ones. A scene has few pairs
+  /// of inner surfaces, so that a part's flat outer sides are far more frequent there than among the model's pairs.
+  kSignalToNoise,
 };
 
 /// Lengths |P Q1| and |P Q2| of the two vectors of a pair, as shares of the diameter, [0.05, 0.9].

@@ -73,14 +73,20 @@ std::vector<ContourPoint> evenly_taken(const std::vector<ContourPoint>& all, std
 void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>& masks, std::size_t count,
                   const RunControl& control, Model& model) {
   const int views = model.params.viewpoint_count;
-  const std::vector<double> ph =
-      occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width), control);
-  std::vector<double> values(pairs.size());
+  std::vector<double> obs(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (control.interrupted_at(i)) return;
-    const double obs = observability(masks[pairs[i].p], masks[pairs[i].q1], masks[pairs[i].q2], views);
-    values[i] = pair_value(obs, ph[i], model.params);
+    obs[i] = observability(masks[pairs[i].p], masks[pairs[i].q1], masks[pairs[i].q2], views);
   }
+  std::vector<double> weights;
+  if (model.params.selection == PairSelection::kSignalToNoise) {
+    for (const double seen : obs) weights.push_back(std::max(seen, 1.0 / views));  // never none: Ph divides
+  }
+  const std::vector<double> ph =
+      occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width), control, weights);
+  if (control.interrupted()) return;
+  std::vector<double> values(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) values[i] = pair_value(obs[i], ph[i], model.params);
   for (const std::size_t i : best_pairs(values, count)) {
     model.pairs.push_back(pairs[i]);
     // A vote for a frequent feature says less: its false votes are more.

@@ -42,17 +42,21 @@ std::vector<VectorPair> vector_pairs(std::span<const SurfacePoint> points, const
 }
 
 std::vector<double> occurrence_probability(std::span<const SurfacePoint> points, std::span<const VectorPair> pairs,
-                                           const FeatureBins& bins, const RunControl& control) {
+                                           const FeatureBins& bins, const RunControl& control,
+                                           std::span<const double> weights) {
   std::vector<int> bin_of_pair(pairs.size());
   std::vector<double> histogram(bins.count(), 0);  // h of Eq. (2) and (3)
+  double total = 0;
   for (std::size_t i = 0; i < pairs.size() && !control.interrupted_at(i); ++i) {
     const SurfacePoint &p = points[pairs[i].p], &q1 = points[pairs[i].q1], &q2 = points[pairs[i].q2];
     bin_of_pair[i] = bins.bin(pair_normals(pair_frame(p.position, q1.position, q2.position), p, q1, q2));
-    histogram[bin_of_pair[i]] += 1;
+    const double weight = weights.empty() ? 1 : weights[i];
+    histogram[bin_of_pair[i]] += weight;
+    total += weight;
   }
   std::vector<double> probability(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    probability[i] = histogram[bin_of_pair[i]] / static_cast<double>(pairs.size());  // Eq. (4)
+    probability[i] = histogram[bin_of_pair[i]] / total;  // Eq. (4)
   }
   return probability;
 }

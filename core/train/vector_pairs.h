@@ -24,7 +24,10 @@ std::vector<VectorPair> vector_pairs(std::span<const SurfacePoint> points, const
 
 /// Ph of each pair [Eq. 2-4]: the share of all pairs that have its feature f(s_p, s_q1, s_q2). 1 - Ph is the
 /// distinctiveness. In the order of `pairs`, each in (0, 1]; of no use when `control` interrupts.
+///
+/// @param weights  how much each pair counts, positive, in the order of `pairs`; empty: all alike, as in the paper.
 std::vector<double> occurrence_probability(std::span<const SurfacePoint> points, std::span<const VectorPair> pairs,
-                                           const FeatureBins& bins, const RunControl& control = {});
+                                           const FeatureBins& bins, const RunControl& control = {},
+                                           std::span<const double> weights = {});
 
 }  // namespace binpose

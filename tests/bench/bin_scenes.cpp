@@ -199,6 +199,7 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   std::map<std::string, Row> rows;
   Row all;
   DetectStats sum;
+  int searched = 0;
   const std::vector<std::filesystem::path> folders = scene_folders(scenes_folder, filter);
   for (const auto& folder : folders) {
     BinScene scene = read_scene(folder, ply);
@@ -228,11 +229,12 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
     }
     const DetectStats& s = result->stats;
     add(sum, s);
+    ++searched;
   }
   for (const auto& [name, row] : rows) print(name, row);
   if (folders.empty() || wrong_parts) return folders.empty() ? 1 : 0;
   print("ALL", all);
-  const double n = static_cast<double>(folders.size());
+  const double n = std::max(1, searched);
   std::printf("mean ms: preprocess %.1f vote %.1f cluster %.1f refine %.1f verify %.1f rank %.1f total %.1f\n",
               1000 * sum.preprocess_seconds / n, 1000 * sum.vote_seconds / n, 1000 * sum.cluster_seconds / n,
               1000 * sum.refine_seconds / n, 1000 * sum.verify_seconds / n, 1000 * sum.rank_seconds / n,

@@ -86,6 +86,18 @@ TEST(OccurrenceProbability, IsTheShareOfPairsWithTheFeature) {  // Eq. (2-4)
   for (std::size_t i = 0; i < ph.size(); ++i) EXPECT_DOUBLE_EQ(ph[i], expected[i]) << i;
 }
 
+TEST(OccurrenceProbability, CountsEachPairByItsWeight) {
+  const Eigen::Vector3f up(0, 0, 1), side(1, 0, 0);
+  const std::vector<SurfacePoint> points = {
+      {{0, 0, 0}, up}, {{0.03F, 0, 0}, up}, {{0, 0.02F, 0}, up}, {{0, 0, 0}, side}};
+  const std::vector<VectorPair> pairs = {{0, 1, 2, 0}, {3, 1, 2, 0}, {0, 1, 2, 0}};
+  const std::vector<double> seen = {0.5, 0.1, 0.2};
+  const std::vector<double> ph = occurrence_probability(points, pairs, FeatureBins(12 * kDegree), {}, seen);
+  EXPECT_DOUBLE_EQ(ph[0], 0.7 / 0.8);
+  EXPECT_DOUBLE_EQ(ph[1], 0.1 / 0.8);
+  EXPECT_DOUBLE_EQ(ph[2], 0.7 / 0.8);
+}
+
 TEST(OccurrenceProbability, AgreesWithAMapOfFeatures) {
   const std::vector<SurfacePoint> points = thin_evenly(scatter(testing::stepped_shaft(), 0.0015), 0.008);
   const std::vector<VectorPair> pairs = vector_pairs(points, {0.30, 0.22}, kTolerance, kDiameter, 0, {});
