@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/train/sample_surface.h"
 #include "tests/bench/paper/over_scenes.h"
 #include "tests/bench/paper/runs.h"
 #include "tests/bench/paper/scan_alone.h"
@@ -12,10 +13,17 @@
 namespace binpose::paper {
 namespace {
 
-constexpr int kDensitiesMm[] = {3, 1};  // between points: the paper's, and a finer one
-constexpr double kMostTurn = 30;        // degrees, about each axis
-constexpr double kMostShift = 0.3;      // metres, along each axis
-constexpr double kDistance = 0.8;       // metres, from the sensor to the middle of the places
+/// How a moved part becomes a cloud.
+struct SceneKind {
+  const char* name;
+  bool whole_surface;  ///< the paper's: the model's own surface moved, all sides at once; else what a sensor sees
+  double spacing;      ///< between points, metres
+};
+constexpr SceneKind kSceneKinds[] = {
+    {"whole surface, 3 mm", true, 0.003}, {"one side, 3 mm", false, 0.003}, {"one side, 1 mm", false, 0.001}};
+constexpr double kMostTurn = 30;    // degrees, about each axis
+constexpr double kMostShift = 0.3;  // metres, along each axis
+constexpr double kDistance = 0.8;   // metres, from the sensor to the middle of the places
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// Turned about x, y and z, then shifted, at random.
@@ -27,6 +35,18 @@ Pose random_pose(scenes::Random random) {
   const Eigen::AngleAxisd turn_z(angle(), Eigen::Vector3d::UnitZ());
   const double x = shift(), y = shift(), z = shift();
   return Eigen::Translation3d(x, y, kDistance + z) * Pose(turn_z * turn_y * turn_x);
+}
+
+/// Points all over the part's surface, with its normals.
+PointCloud moved_surface(const Mesh& part, const Pose& T_scene_model, double spacing) {
+  PointCloud cloud;
+  for (const SurfacePoint& point : thin_evenly(scatter(part, spacing / 4), spacing)) {
+    cloud.points.emplace_back((T_scene_model * point.position.cast<double>()).cast<float>());
+    cloud.normals.emplace_back((T_scene_model.linear() * point.normal.cast<double>()).cast<float>());
+  }
+  cloud.width = static_cast<std::uint32_t>(cloud.points.size());
+  cloud.height = 1;
+  return cloud;
 }
 
 /// The largest of the three turns about x, y and z that lead from one rotation to the other, degrees.
@@ -60,16 +80,17 @@ void run_accuracy(const std::filesystem::path& parts, int count, const std::file
 
   RunLog log(output);
   const scenes::Random random(5);
-  for (const int density_mm : kDensitiesMm) {
+  for (const SceneKind& kind : kSceneKinds) {
     for (int i = 0; i < count; ++i) {
-      const std::string key = std::to_string(density_mm) + " mm, scene " + std::to_string(i);
+      const std::string key = std::string(kind.name) + ", scene " + std::to_string(i);
       if (log.has(key)) continue;
       const Pose T_scene_model = random_pose(random.fork(i));
-      const PointCloud cloud = scan_alone(part.mesh, T_scene_model, 0.001 * density_mm);
+      const PointCloud cloud = kind.whole_surface ? moved_surface(part.mesh, T_scene_model, kind.spacing)
+                                                  : scan_alone(part.mesh, T_scene_model, kind.spacing);
       Json results;
       for (const auto& [name, find] : finders) results[name] = errors(find, cloud, T_scene_model, box.center());
-      log.add(key, {{"density_mm", density_mm}, {"results", results}});
-      if ((i + 1) % 50 == 0) show_progress("accuracy", i + 1, count, std::to_string(density_mm) + " mm");
+      log.add(key, {{"scene", kind.name}, {"density_mm", std::lround(1000 * kind.spacing)}, {"results", results}});
+      if ((i + 1) % 50 == 0) show_progress("accuracy", i + 1, count, kind.name);
     }
   }
 }

@@ -7,7 +7,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  the backend comes first
 import numpy as np  # noqa: E402
 
-from tables import measured, total, wilson  # noqa: E402
+from tables import measured, scene_kinds, total, wilson  # noqa: E402
 
 COLOURS = {"distinctiveness": "tab:red", "observability": "tab:green", "integration": "tab:blue",
            "unrefined": "tab:orange", "binpose": "black"}
@@ -29,11 +29,11 @@ def rate_with_bounds(runs):
 
 
 def errors(log, path):
-    """Fig. 5: share of the scenes below an error, for translation and rotation, at each density."""
-    densities = sorted({line["density_mm"] for line in log}, reverse=True)
-    figure, axes = plt.subplots(len(densities), 2, figsize=(9, 3 * len(densities)), sharey=True, squeeze=False)
-    for row, density in zip(axes, densities):
-        lines = [line["results"] for line in log if line["density_mm"] == density]
+    """Fig. 5: share of the scenes below an error, for translation and rotation, for each kind of cloud."""
+    kinds = scene_kinds(log)
+    figure, axes = plt.subplots(len(kinds), 2, figsize=(9, 3 * len(kinds)), sharey=True, squeeze=False)
+    for row, (scene, density) in zip(axes, kinds):
+        lines = [line["results"] for line in log if line["scene"] == scene]
         for axis, field, unit, bar in ((row[0], "degrees", "degrees", 5), (row[1], "mm", "mm", density)):
             for name, label in LABELS.items():
                 values = sorted(line[name][field] if line[name] else np.inf for line in lines)
@@ -42,7 +42,7 @@ def errors(log, path):
             axis.axvline(bar, color="grey", linestyle="--", linewidth=1)
             axis.axvline(bar / 10, color="grey", linestyle=":", linewidth=1)
             axis.set(xscale="log", xlim=(0.003, 300), ylim=(0, 101), xlabel=f"error, {unit}",
-                     title=f"{'rotation' if field == 'degrees' else 'translation'}, {density} mm between points")
+                     title=f"{'rotation' if field == 'degrees' else 'translation'}, {scene}")
             axis.grid(alpha=0.3)
         row[0].set_ylabel("% of the scenes below")
     axes[0][0].legend(loc="upper left", fontsize=8)

@@ -108,18 +108,23 @@ def unrefined(log):
     return rows(["as the paper has it: no ICP", *PARTS.values(), "all"], body)
 
 
+def scene_kinds(log):
+    """How Fig. 5's clouds are made, and their density in mm, in the order of the log."""
+    return list(dict.fromkeys((line["scene"], line["density_mm"]) for line in log))
+
+
 def accuracy(log):
     names = {"unrefined": "the paper's preset, no ICP", "integration": "the paper's preset and ICP",
              "binpose": METHODS["binpose"]}
     body = []
-    for density in sorted({line["density_mm"] for line in log}, reverse=True):
-        lines = [line["results"] for line in log if line["density_mm"] == density]
+    for scene, density in scene_kinds(log):
+        lines = [line["results"] for line in log if line["scene"] == scene]
         for name, title in names.items():
             found = [line[name] for line in lines if line[name]]
             share = [rate(sum(error["mm"] <= limit_mm and error["degrees"] <= limit for error in found), len(lines))
                      for limit_mm, limit in ((density, 5), (density / 10, 0.5))]
             medians = [f"{statistics.median(error[field] for error in found):.3f}" if found else "-"
                        for field in ("mm", "degrees")]
-            body.append([f"{density} mm", title, *share, *medians])
-    return rows(["density", "method", "within the density and 5 degrees", "within a tenth of both", "median mm",
+            body.append([scene, title, *share, *medians])
+    return rows(["scene", "method", "within the density and 5 degrees", "within a tenth of both", "median mm",
                  "median degrees"], body)
