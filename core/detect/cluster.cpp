@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <numeric>
 
+#include "core/detect/thin_clusters.h"
+
 namespace binpose {
 namespace {
 
@@ -117,11 +119,6 @@ std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cel
   return cells;
 }
 
-bool same_pose(const PoseCluster& a, const PoseCluster& b, float radius, float half_angle_cosine) {
-  return (a.centre - b.centre).squaredNorm() < radius * radius &&
-         std::abs(a.q_view_model.coeffs().dot(b.q_view_model.coeffs())) > half_angle_cosine;
-}
-
 PoseCluster mean(const Cell& cell) {
   return {cell.centre / cell.weight, Eigen::Quaternionf(Eigen::Vector4f(cell.quaternion.normalized())), cell.weight};
 }
@@ -181,67 +178,18 @@ PoseCluster with_neighbours(const std::vector<Cell>& cells, const CellIndex& ind
   const RotationCoordinates rotation(own.q_view_model);
   const Eigen::Array3i low_cell = (cell_of.centre_coordinates(own.centre) - 0.5F).cast<int>();
   const std::uint64_t low_rotation = CellOf::rotation_key(rotation.largest, (rotation.rest - 0.5F).cast<int>());
-  const float half_angle_cosine = std::cos(0.5F * options.angle);
+  const SamePose same_pose(options);
   Cell sum = cells[seed];
   for (int i = 0; i < 8; ++i) {
     const Eigen::Array3i cell = low_cell + Eigen::Array3i(i & 1, i >> 1 & 1, i >> 2 & 1);
     index.for_each_near(cell_of.centre_key(cell), low_rotation, [&](std::uint32_t found) {
       if (found == seed) return;
       const PoseCluster other = mean(cells[found]);
-      if (!same_pose(own, other, options.radius, half_angle_cosine)) return;
+      if (!same_pose(own, other)) return;
       add(sum, other.votes, other.centre, other.q_view_model.coeffs());
     });
   }
   return mean(sum);
-}
-
-/// Clusters found by place. A cluster lies in the buckets of its own cell and of the 8 around it, x and y wrapped, so
-/// that one bucket holds all that lie within a cell's side of a place, and some that don't.
-class ClusterGrid {
- public:
-  explicit ClusterGrid(float side) : inverse_(1 / side) {}
-
-  const std::vector<std::uint32_t>& around(const Eigen::Vector3f& place) const {
-    const Eigen::Array2i c = cell(place);
-    return buckets_[bucket(c.x(), c.y())];
-  }
-  void insert(const Eigen::Vector3f& place, std::uint32_t index) {
-    const Eigen::Array2i c = cell(place);
-    for (int i = 0; i < 9; ++i) buckets_[bucket(c.x() + i % 3 - 1, c.y() + i / 3 - 1)].push_back(index);
-  }
-
- private:
-  static constexpr int kSide = 32;
-  Eigen::Array2i cell(const Eigen::Vector3f& p) const {
-    return (p.head<2>().array() * inverse_).floor().max(-1e6F).min(1e6F).cast<int>();
-  }
-  static int bucket(int x, int y) { return (y & (kSide - 1)) * kSide + (x & (kSide - 1)); }
-
-  float inverse_;
-  std::array<std::vector<std::uint32_t>, kSide * kSide> buckets_;
-};
-
-/// The strongest clusters, without those that repeat a stronger one or have too many of them around.
-std::vector<PoseCluster> thin_out(const std::vector<PoseCluster>& clusters, const ClusterOptions& options) {
-  const float half_angle_cosine = std::cos(0.5F * options.angle);
-  std::vector<PoseCluster> kept;
-  ClusterGrid grid(options.neighbourhood);
-  for (const PoseCluster& candidate : clusters) {
-    if (static_cast<int>(kept.size()) >= options.most) break;
-    int around = 0;
-    bool repeats = false;
-    for (const std::uint32_t i : grid.around(candidate.centre)) {
-      const PoseCluster& other = kept[i];
-      if ((other.centre - candidate.centre).squaredNorm() > options.neighbourhood * options.neighbourhood) continue;
-      ++around;
-      repeats = repeats || same_pose(other, candidate, options.radius, half_angle_cosine);
-      if (repeats || around >= options.most_per_neighbourhood) break;
-    }
-    if (repeats || around >= options.most_per_neighbourhood) continue;
-    grid.insert(candidate.centre, static_cast<std::uint32_t>(kept.size()));
-    kept.push_back(candidate);
-  }
-  return kept;
 }
 
 }  // namespace
@@ -269,7 +217,7 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });
 
-  return thin_out(merged, options);
+  return thin_clusters(merged, options);
 }
 
 }  // namespace binpose

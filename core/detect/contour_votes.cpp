@@ -68,9 +68,7 @@ void find_partners(const ContourGrid& grid, int a, int first, int last, const Pa
                            (sq_distance <= limits.longest * limits.longest) &
                            (magnitude(dot(line, n)) <= limits.flatness) &
                            (magnitude(dot(line, normal)) <= limits.flatness) & (dot(normal, n) >= kSameNormalCosine);
-    for (int i = 0; i < std::min(kLanes, last - b); ++i) {
-      if (pairs[i] != 0) found.push_back(b + i);
-    }
+    for_each_set(pairs, last - b, [&](int lane) { found.push_back(b + lane); });
   }
 }
 

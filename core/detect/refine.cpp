@@ -7,6 +7,7 @@
 
 #include "core/detect/point_block.h"
 #include "core/detect/verify.h"
+#include "core/geometry/pose.h"
 
 namespace binpose {
 namespace {
@@ -164,11 +165,7 @@ Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::I
     if (equations.rows < kFewestCorrespondences) break;
     const Eigen::Matrix<float, 6, 1> step = solve(equations, radius);
     if (!step.allFinite()) break;
-    const float angle = step.head<3>().norm();
-    Eigen::Isometry3f move = Eigen::Isometry3f::Identity();
-    if (angle > 1e-9F) move.linear() = Eigen::AngleAxisf(angle, step.head<3>() / angle).toRotationMatrix();
-    move.translation() = pivot + step.tail<3>() - move.linear() * pivot;
-    T = move * T;
+    T = Eigen::Translation3f(step.tail<3>()) * turn_about(pivot, rotation_by(step.head<3>())) * T;
   }
   return T;
 }

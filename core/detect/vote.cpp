@@ -58,9 +58,7 @@ void find_at_right_angle(const Ring& ring, const Eigen::Vector3f& direction, std
   const int count = static_cast<int>(ring.points.size());
   for (int first = 0; first < count; first += kLanes) {
     const LaneInts right = magnitude(dot(ring.directions.load(first), direction)) <= kRightAngleCosine;
-    for (int i = 0; i < std::min(kLanes, count - first); ++i) {
-      if (right[i] != 0) found.push_back(ring.points[first + i]);
-    }
+    for_each_set(right, count - first, [&](int lane) { found.push_back(ring.points[first + lane]); });
   }
 }
 

@@ -39,6 +39,14 @@ using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< ma
   return sum;
 }
 
+/// Calls `use(lane)` for each of the first `count` lanes that a mask has set.
+template <typename Use>
+[[gnu::always_inline]] inline void for_each_set(const LaneInts& mask, int count, Use&& use) {
+  for (int lane = 0; lane < kLanes && lane < count; ++lane) {
+    if (mask[lane] != 0) use(lane);
+  }
+}
+
 /// In a fixed order, whatever the processor.
 [[gnu::always_inline]] inline float sum_of(const Lanes& a) {
   return ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]));

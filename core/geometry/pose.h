@@ -18,6 +18,21 @@ inline Matrix6d seen_from(const Eigen::Vector3d& shift) {
   return m;
 }
 
+/// The turn by R about a point that stays where it is.
+inline Eigen::Isometry3f turn_about(const Eigen::Vector3f& point, const Eigen::Matrix3f& R) {
+  Eigen::Isometry3f turn = Eigen::Isometry3f::Identity();
+  turn.linear() = R;
+  turn.translation() = point - R * point;
+  return turn;
+}
+
+/// The rotation about the direction of a vector by its length, radians.
+inline Eigen::Matrix3f rotation_by(const Eigen::Vector3f& rotation_vector) {
+  const float angle = rotation_vector.norm();
+  if (!(angle > 1e-9F)) return Eigen::Matrix3f::Identity();
+  return Eigen::AngleAxisf(angle, rotation_vector / angle).toRotationMatrix();
+}
+
 /// Rotation angle between two orientations, radians in [0, pi].
 inline double rotation_distance(const Pose& a, const Pose& b) {
   return Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle();

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/geometry/cell_index.h"
+#include "core/geometry/pose.h"
 #include "core/geometry/view_sphere.h"
 #include "core/train/sample_surface.h"
 
@@ -111,9 +112,8 @@ std::vector<RatedTurn> coarse_turns(const Nearness& nearness, const std::vector<
     const Eigen::Matrix3f tilt = turn_towards(direction);
     for (int k = 0; k < kTurns; ++k) {
       const float angle = static_cast<float>(2 * std::numbers::pi * k / kTurns);
-      Eigen::Isometry3f T = Eigen::Isometry3f::Identity();
-      T.linear() = tilt * Eigen::AngleAxisf(angle, Eigen::Vector3f::UnitZ()).toRotationMatrix();
-      T.translation() = middle - T.linear() * middle;
+      const Eigen::Isometry3f T =
+          turn_about(middle, tilt * Eigen::AngleAxisf(angle, Eigen::Vector3f::UnitZ()).toRotationMatrix());
       double sum = 0;
       for (std::size_t i = 0; i < count; ++i) sum += nearness.at(T * surface[i].position);
       if (sum >= kCoarseShare * static_cast<double>(count)) turns.push_back({T, sum / static_cast<double>(count)});
@@ -215,9 +215,7 @@ class TurnSearch {
     const auto [direction, point] = axis_of(T, middle_);
     for (int i = 1; i <= kAxisProbes; ++i) {
       const float angle = static_cast<float>(2 * std::numbers::pi * std::fmod(0.6180339887 * i, 1.0));
-      Eigen::Isometry3f turn = Eigen::Isometry3f::Identity();
-      turn.linear() = Eigen::AngleAxisf(angle, direction).toRotationMatrix();
-      turn.translation() = point - turn.linear() * point;
+      const Eigen::Isometry3f turn = turn_about(point, Eigen::AngleAxisf(angle, direction).toRotationMatrix());
       if (control.interrupted() || share(turn, kJudgedPoints) < kSameShare) return false;
     }
     return true;
@@ -259,12 +257,8 @@ class TurnSearch {
       // Damped: turns about an axis of revolution are free.
       A.diagonal().array() += 1e-4 * A.trace() / 6;
       const Eigen::Matrix<float, 6, 1> step = A.ldlt().solve(b).cast<float>();
-      const float angle = step.head<3>().norm() / radius();
       if (!step.allFinite()) break;
-      Eigen::Isometry3f move = Eigen::Isometry3f::Identity();
-      if (angle > 1e-9F) move.linear() = Eigen::AngleAxisf(angle, step.head<3>().normalized()).toRotationMatrix();
-      move.translation() = middle_ + step.tail<3>() - move.linear() * middle_;
-      T = move * T;
+      T = Eigen::Translation3f(step.tail<3>()) * turn_about(middle_, rotation_by(step.head<3>() / radius())) * T;
     }
     return T;
   }
