@@ -23,6 +23,7 @@ for preset in "$@"; do
       cmake --build build/asan
       # PCL's allocations, which one test compares ours with, do not fit the sanitizer's idea of new and delete.
       export ASAN_OPTIONS=alloc_dealloc_mismatch=0:detect_stack_use_after_return=1
+      export LSAN_OPTIONS=suppressions=tests/sanitize_suppressions.txt
       # shellcheck disable=SC2046  # names of tests have no spaces
       run_tests asan $(cd build/asan/bin && ls -- *_test)
       ;;
