@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace binpose {
 
@@ -20,15 +19,21 @@ double pair_value(double obs, double ph, const TrainParams& params) {
   return 0;
 }
 
-std::vector<std::size_t> best_pairs(std::span<const double> values, std::size_t count) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), 0);
-  count = std::min(count, order.size());
-  std::partial_sort(
-      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-      [&](std::size_t a, std::size_t b) { return values[a] != values[b] ? values[a] > values[b] : a < b; });
-  order.resize(count);
-  return order;
+std::vector<std::size_t> best_pairs(std::span<const double> values, std::size_t count, const RunControl& control) {
+  constexpr std::size_t kBlock = 1 << 16;  // between two looks at `control`: a millisecond or two
+  const auto better = [&](std::size_t a, std::size_t b) {
+    return values[a] != values[b] ? values[a] > values[b] : a < b;
+  };
+  std::vector<std::size_t> best;
+  for (std::size_t first = 0; first < values.size(); first += kBlock) {
+    if (control.interrupted()) return {};
+    for (std::size_t i = first; i < std::min(values.size(), first + kBlock); ++i) best.push_back(i);
+    if (best.size() <= count) continue;
+    std::nth_element(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(count), best.end(), better);
+    best.resize(count);
+  }
+  std::sort(best.begin(), best.end(), better);
+  return best;
 }
 
 }  // namespace binpose

@@ -87,7 +87,7 @@ void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>
   if (control.interrupted()) return;
   std::vector<double> values(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) values[i] = pair_value(obs[i], ph[i], model.params);
-  for (const std::size_t i : best_pairs(values, count)) {
+  for (const std::size_t i : best_pairs(values, count, control)) {
     model.pairs.push_back(pairs[i]);
     // A vote for a frequent feature says less: its false votes are more.
     model.pair_weights.push_back(static_cast<float>(1 / std::sqrt(ph[i] * static_cast<double>(pairs.size()))));

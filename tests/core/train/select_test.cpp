@@ -26,13 +26,15 @@ TEST(PairValue, OfEachSelectionByHand) {
 TEST(BestPairs, AreTheFirstOfAStableSort) {
   scenes::Random random(4);
   std::vector<double> values;
-  values.reserve(500);
-  for (int i = 0; i < 500; ++i) values.push_back(static_cast<double>(random.next() % 40));  // many are equal
+  constexpr std::size_t kCount = 150000;  // some blocks
+  values.reserve(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) values.push_back(static_cast<double>(random.next() % 10000));  // many equal
   std::vector<std::size_t> sorted;
   for (std::size_t i = 0; i < values.size(); ++i) sorted.push_back(i);
   std::stable_sort(sorted.begin(), sorted.end(), [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
-  for (const std::size_t count : {0, 1, 7, 100, 500}) {
-    EXPECT_EQ(best_pairs(values, count), std::vector<std::size_t>(sorted.begin(), sorted.begin() + count));
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{4000}, kCount}) {
+    EXPECT_EQ(best_pairs(values, count),
+              std::vector<std::size_t>(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count)));
   }
 }
 
