@@ -15,8 +15,7 @@ Pose best_turn(const Symmetry& symmetry, const Eigen::Matrix3d& weighted) {
   const double sine = (weighted(1, 2) - weighted(2, 1)) * axis.x() + (weighted(2, 0) - weighted(0, 2)) * axis.y() +
                       (weighted(0, 1) - weighted(1, 0)) * axis.z();
   if (std::hypot(cosine, sine) <= kTie) return Pose::Identity();
-  return Eigen::Translation3d(symmetry.axis_point) * Eigen::AngleAxisd(std::atan2(sine, cosine), axis) *
-         Eigen::Translation3d(-symmetry.axis_point);
+  return turn_about(symmetry.axis_point, Eigen::AngleAxisd(std::atan2(sine, cosine), axis).toRotationMatrix());
 }
 
 }  // namespace

@@ -173,12 +173,11 @@ class CellIndex {
 
 /// A cell with those of the 64 cells around its mean (8 of centre, 8 of rotation) that agree with it.
 PoseCluster with_neighbours(const std::vector<Cell>& cells, const CellIndex& index, std::uint32_t seed,
-                            const CellOf& cell_of, const ClusterOptions& options) {
+                            const CellOf& cell_of, const SamePose& same_pose) {
   const PoseCluster own = mean(cells[seed]);
   const RotationCoordinates rotation(own.q_view_model);
   const Eigen::Array3i low_cell = (cell_of.centre_coordinates(own.centre) - 0.5F).cast<int>();
   const std::uint64_t low_rotation = CellOf::rotation_key(rotation.largest, (rotation.rest - 0.5F).cast<int>());
-  const SamePose same_pose(options);
   Cell sum = cells[seed];
   for (int i = 0; i < 8; ++i) {
     const Eigen::Array3i cell = low_cell + Eigen::Array3i(i & 1, i >> 1 & 1, i >> 2 & 1);
@@ -209,10 +208,11 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
                       return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;
                     });
   const CellIndex index(cells);
+  const SamePose same_pose(options);
   std::vector<PoseCluster> merged;
   for (std::size_t i = 0; i < seed_count; ++i) {
     if (control.stop.stop_requested()) return {};
-    merged.push_back(with_neighbours(cells, index, seeds[i], cell_of, options));
+    merged.push_back(with_neighbours(cells, index, seeds[i], cell_of, same_pose));
   }
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <type_traits>
 
 namespace binpose {
 
@@ -19,8 +20,10 @@ inline Matrix6d seen_from(const Eigen::Vector3d& shift) {
 }
 
 /// The turn by R about a point that stays where it is.
-inline Eigen::Isometry3f turn_about(const Eigen::Vector3f& point, const Eigen::Matrix3f& R) {
-  Eigen::Isometry3f turn = Eigen::Isometry3f::Identity();
+template <typename Scalar>
+Eigen::Transform<Scalar, 3, Eigen::Isometry> turn_about(const Eigen::Vector<Scalar, 3>& point,
+                                                        const std::type_identity_t<Eigen::Matrix<Scalar, 3, 3>>& R) {
+  auto turn = Eigen::Transform<Scalar, 3, Eigen::Isometry>::Identity();
   turn.linear() = R;
   turn.translation() = point - R * point;
   return turn;

@@ -199,7 +199,6 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   std::map<std::string, Row> rows;
   Row all;
   DetectStats sum;
-  int searched = 0;
   const std::vector<std::filesystem::path> folders = scene_folders(scenes_folder, filter);
   for (const auto& folder : folders) {
     BinScene scene = read_scene(folder, ply);
@@ -229,12 +228,11 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
     }
     const DetectStats& s = result->stats;
     add(sum, s);
-    ++searched;
   }
   for (const auto& [name, row] : rows) print(name, row);
   if (folders.empty() || wrong_parts) return folders.empty() ? 1 : 0;
   print("ALL", all);
-  const double n = std::max(1, searched);
+  const auto n = static_cast<double>(std::max<std::size_t>(1, all.milliseconds.size()));
   std::printf("mean ms: preprocess %.1f vote %.1f cluster %.1f refine %.1f verify %.1f rank %.1f total %.1f\n",
               1000 * sum.preprocess_seconds / n, 1000 * sum.vote_seconds / n, 1000 * sum.cluster_seconds / n,
               1000 * sum.refine_seconds / n, 1000 * sum.verify_seconds / n, 1000 * sum.rank_seconds / n,

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "core/train/sample_surface.h"
 #include "tests/bench/paper/over_scenes.h"
@@ -15,12 +16,15 @@ namespace {
 
 /// How a moved part becomes a cloud.
 struct SceneKind {
-  const char* name;
   bool whole_surface;  ///< the paper's: the model's own surface moved, all sides at once; else what a sensor sees
-  double spacing;      ///< between points, metres
+  int density_mm;      ///< between points
+
+  double spacing() const { return 0.001 * density_mm; }  // metres
+  std::string name() const {
+    return (whole_surface ? "whole surface, " : "one side, ") + std::to_string(density_mm) + " mm";
+  }
 };
-constexpr SceneKind kSceneKinds[] = {
-    {"whole surface, 3 mm", true, 0.003}, {"one side, 3 mm", false, 0.003}, {"one side, 1 mm", false, 0.001}};
+constexpr SceneKind kSceneKinds[] = {{true, 3}, {false, 3}, {false, 1}};
 constexpr double kMostTurn = 30;    // degrees, about each axis
 constexpr double kMostShift = 0.3;  // metres, along each axis
 constexpr double kDistance = 0.8;   // metres, from the sensor to the middle of the places
@@ -82,15 +86,15 @@ void run_accuracy(const std::filesystem::path& parts, int count, const std::file
   const scenes::Random random(5);
   for (const SceneKind& kind : kSceneKinds) {
     for (int i = 0; i < count; ++i) {
-      const std::string key = std::string(kind.name) + ", scene " + std::to_string(i);
+      const std::string key = kind.name() + ", scene " + std::to_string(i);
       if (log.has(key)) continue;
       const Pose T_scene_model = random_pose(random.fork(i));
-      const PointCloud cloud = kind.whole_surface ? moved_surface(part.mesh, T_scene_model, kind.spacing)
-                                                  : scan_alone(part.mesh, T_scene_model, kind.spacing);
+      const PointCloud cloud = kind.whole_surface ? moved_surface(part.mesh, T_scene_model, kind.spacing())
+                                                  : scan_alone(part.mesh, T_scene_model, kind.spacing());
       Json results;
       for (const auto& [name, find] : finders) results[name] = errors(find, cloud, T_scene_model, box.center());
-      log.add(key, {{"scene", kind.name}, {"density_mm", std::lround(1000 * kind.spacing)}, {"results", results}});
-      if ((i + 1) % 50 == 0) show_progress("accuracy", i + 1, count, kind.name);
+      log.add(key, {{"scene", kind.name()}, {"density_mm", kind.density_mm}, {"results", results}});
+      if ((i + 1) % 50 == 0) show_progress("accuracy", i + 1, count, kind.name());
     }
   }
 }
