@@ -49,10 +49,11 @@ int ContourTable::angle_bin(float angle) {
 }
 
 ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs,
-                           std::span<const float> weights, const Eigen::Vector3f& centre, float diameter)
+                           std::span<const float> weights, const Eigen::Vector3f& centre, float diameter,
+                           const RunControl& control)
     : diameter_(diameter), distance_tolerance_(kRelativeDistanceTolerance * diameter) {
   std::vector<ContourFeature> features;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
+  for (std::size_t i = 0; i < pairs.size() && !control.interrupted_at(i); ++i) {
     for (const auto& [a, b] : {std::pair(pairs[i].a, pairs[i].b), std::pair(pairs[i].b, pairs[i].a)}) {
       const std::optional<ContourFrame> frame = contour_frame(points[a], points[b], 0, 2 * diameter, diameter);
       if (!frame) continue;
@@ -61,8 +62,8 @@ ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const
       votes_.push_back({T_pair_model * centre, weights[i], Eigen::Quaternionf(T_pair_model.linear())});
     }
   }
-  std::vector<std::vector<Entry>> slots(slot_of(kDistanceBins - 1, kAngleBins - 1, kAngleBins - 1) + 1);
-  for (std::uint32_t i = 0; i < features.size(); ++i) {
+  std::vector<std::pair<std::uint32_t, Entry>> placed;
+  for (std::uint32_t i = 0; i < features.size() && !control.interrupted_at(i); ++i) {
     const ContourFeature& f = features[i];
     const int low = distance_bin(f.distance - distance_tolerance_),
               high = distance_bin(f.distance + distance_tolerance_);
@@ -70,18 +71,14 @@ ContourTable::ContourTable(std::span<const ContourPoint> points, std::span<const
     for (int d = low; d <= high; ++d) {
       for (int a = -1; a <= 1; ++a) {
         for (int b = -1; b <= 1; ++b) {
-          slots[slot_of(d, (angle_bin(f.angle_a) + a + kAngleBins) % kAngleBins,
-                        (angle_bin(f.angle_b) + b + kAngleBins) % kAngleBins)]
-              .push_back({f, i});
+          placed.emplace_back(slot_of(d, (angle_bin(f.angle_a) + a + kAngleBins) % kAngleBins,
+                                      (angle_bin(f.angle_b) + b + kAngleBins) % kAngleBins),
+                              Entry{f, i});
         }
       }
     }
   }
-  first_.push_back(0);
-  for (const std::vector<Entry>& slot : slots) {
-    entries_.insert(entries_.end(), slot.begin(), slot.end());
-    first_.push_back(static_cast<std::uint32_t>(entries_.size()));
-  }
+  slots_ = by_slot<Entry>(placed, slot_of(kDistanceBins - 1, kAngleBins - 1, kAngleBins - 1) + 1);
 }
 
 }  // namespace binpose

@@ -9,6 +9,8 @@
 
 #include "core/geometry/depth_map.h"
 #include "core/heap_bytes.h"
+#include "core/run_control.h"
+#include "core/slots.h"
 
 namespace binpose {
 
@@ -54,17 +56,18 @@ class ContourTable {
 
   ContourTable() = default;
   /// @param centre  of the model, the point that is voted for.
+  /// Holds part of the pairs when `control` interrupts.
   ContourTable(std::span<const ContourPoint> points, std::span<const ContourPair> pairs, std::span<const float> weights,
-               const Eigen::Vector3f& centre, float diameter);
+               const Eigen::Vector3f& centre, float diameter, const RunControl& control = {});
 
   /// Calls `use(vote)` for each pair whose distance and angles agree with the feature within the tolerances below.
   template <typename Use>
   void for_each_match(const ContourFeature& feature, Use&& use) const {
-    if (first_.empty()) return;
-    const std::size_t slot =
+    if (slots_.first.empty()) return;
+    const std::uint32_t slot =
         slot_of(distance_bin(feature.distance), angle_bin(feature.angle_a), angle_bin(feature.angle_b));
-    for (std::uint32_t i = first_[slot]; i < first_[slot + 1]; ++i) {
-      const Entry& entry = entries_[i];
+    for (std::uint32_t i = slots_.first[slot]; i < slots_.first[slot + 1]; ++i) {
+      const Entry& entry = slots_.items[i];
       if (std::abs(entry.feature.distance - feature.distance) <= distance_tolerance_ &&
           turn(entry.feature.angle_a, feature.angle_a) <= kAngleTolerance &&
           turn(entry.feature.angle_b, feature.angle_b) <= kAngleTolerance) {
@@ -72,7 +75,7 @@ class ContourTable {
       }
     }
   }
-  std::size_t memory_bytes() const { return heap_bytes(votes_) + heap_bytes(first_) + heap_bytes(entries_); }
+  std::size_t memory_bytes() const { return heap_bytes(votes_) + heap_bytes(slots_.first) + heap_bytes(slots_.items); }
 
  private:
   static constexpr int kDistanceBins = 32;
@@ -92,14 +95,13 @@ class ContourTable {
   }
   int distance_bin(float distance) const;
   static int angle_bin(float angle);
-  static std::size_t slot_of(int distance, int a, int b) {
-    return (static_cast<std::size_t>(distance) * kAngleBins + a) * kAngleBins + b;
+  static std::uint32_t slot_of(int distance, int a, int b) {
+    return (static_cast<std::uint32_t>(distance) * kAngleBins + a) * kAngleBins + b;
   }
 
   float diameter_ = 1, distance_tolerance_ = 0;
   std::vector<Vote> votes_;
-  std::vector<std::uint32_t> first_;  // per slot: where its entries begin
-  std::vector<Entry> entries_;
+  Slots<Entry> slots_;
 };
 
 }  // namespace binpose

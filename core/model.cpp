@@ -16,7 +16,7 @@ void derive(Model& model, const RunControl& control) {
   model.centre = 0.5 * (model.box_min + model.box_max);
   model.viewpoints = view_directions(model.params.viewpoint_count);
   model.visible_from.assign(model.viewpoints.size(), {});
-  for (std::size_t i = 0; i < model.surface.size(); ++i) {
+  for (std::size_t i = 0; i < model.surface.size() && !control.interrupted_at(i); ++i) {
     for (std::size_t k = 0; k < model.viewpoints.size(); ++k) {
       if (sees(model.visibility[i], static_cast<int>(k))) {
         model.visible_from[k].push_back(static_cast<std::uint16_t>(i));
@@ -34,11 +34,12 @@ void derive(Model& model, const RunControl& control) {
   const float mean = sum / static_cast<float>(model.viewpoints.size());
   for (float& area : model.view_area) area /= std::max(mean, 1e-6F);
   if (control.interrupted()) return;
-  model.pair_table = PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
-                               static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin);
+  model.pair_table =
+      PairTable(model.pair_points, model.pairs, model.pair_weights, model.centre.cast<float>(),
+                static_cast<int>(model.params.pair_lengths.size()), model.params.bin_width, kBinMargin, control);
   if (control.interrupted()) return;
   model.contour_table = ContourTable(model.contour_points, model.contour_pairs, model.contour_weights,
-                                     model.centre.cast<float>(), static_cast<float>(model.diameter));
+                                     model.centre.cast<float>(), static_cast<float>(model.diameter), control);
 }
 
 std::size_t memory_bytes(const Model& model) {

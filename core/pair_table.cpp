@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/slots.h"
+
 namespace binpose {
 namespace {
 
@@ -17,12 +19,12 @@ std::pair<int, int> bins_within(const FeatureBins& bins, float cosine, double ma
 
 PairTable::PairTable(std::span<const SurfacePoint> points, std::span<const VectorPair> pairs,
                      std::span<const float> weights, const Eigen::Vector3f& centre, int scale_count, double bin_width,
-                     double margin)
+                     double margin, const RunControl& control)
     : bins_(bin_width) {
-  std::vector<std::vector<std::uint32_t>> pairs_of_slot(static_cast<std::size_t>(scale_count) * bins_.count());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> placed;  // slot and pair
   std::vector<PairNormals> normals(pairs.size());
   votes_.reserve(pairs.size());
-  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+  for (std::uint32_t i = 0; i < pairs.size() && !control.interrupted_at(i); ++i) {
     const SurfacePoint &p = points[pairs[i].p], &q1 = points[pairs[i].q1], &q2 = points[pairs[i].q2];
     const Eigen::Matrix3f frame = pair_frame(p.position, q1.position, q2.position);
     normals[i] = pair_normals(frame, p, q1, q2);
@@ -35,22 +37,24 @@ PairTable::PairTable(std::span<const SurfacePoint> points, std::span<const Vecto
       for (int b = q1_low; b <= q1_high; ++b) {
         for (int c = q2_low; c <= q2_high; ++c) {
           const int bin = (a * bins_.per_axis() + b) * bins_.per_axis() + c;
-          pairs_of_slot[static_cast<std::size_t>(pairs[i].scale) * bins_.count() + bin].push_back(i);
+          placed.emplace_back(pairs[i].scale * bins_.count() + bin, i);
         }
       }
     }
   }
 
+  const Slots<std::uint32_t> slots =
+      by_slot<std::uint32_t>(placed, static_cast<std::size_t>(scale_count) * bins_.count());
   first_block_.push_back(0);
-  for (const std::vector<std::uint32_t>& slot : pairs_of_slot) {
-    for (std::size_t start = 0; start < slot.size(); start += kBlock) {
+  for (std::size_t s = 0; s + 1 < slots.first.size() && !control.interrupted_at(s); ++s) {
+    for (std::uint32_t start = slots.first[s]; start < slots.first[s + 1]; start += kBlock) {
       Block block = {};
       for (int lane = 0; lane < kBlock; ++lane) {
-        const bool used = start + lane < slot.size();
-        block.pair[lane] = used ? slot[start + lane] : kNoPair;
+        const bool used = start + lane < slots.first[s + 1];
+        block.pair[lane] = used ? slots.items[start + lane] : kNoPair;
         for (int c = 0; c < 9 && used; ++c) {
           block.normals[c][lane] =
-              static_cast<std::int16_t>(std::lround(kUnit * normals[slot[start + lane]](c % 3, c / 3)));
+              static_cast<std::int16_t>(std::lround(kUnit * normals[block.pair[lane]](c % 3, c / 3)));
         }
       }
       blocks_.push_back(block);

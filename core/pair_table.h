@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/heap_bytes.h"
+#include "core/run_control.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
@@ -38,8 +39,10 @@ class PairTable {
 
   PairTable() : bins_(1.0) {}
   /// @param scale_count  number of pair lengths; each has its own set of bins.
+  /// Holds part of the pairs when `control` interrupts.
   PairTable(std::span<const SurfacePoint> points, std::span<const VectorPair> pairs, std::span<const float> weights,
-            const Eigen::Vector3f& centre, int scale_count, double bin_width, double margin);
+            const Eigen::Vector3f& centre, int scale_count, double bin_width, double margin,
+            const RunControl& control = {});
 
   const FeatureBins& bins() const { return bins_; }
   /// The blocks of a bin of a scale.

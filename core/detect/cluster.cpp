@@ -124,9 +124,9 @@ PoseCluster mean(const Cell& cell) {
 }
 
 /// Finds the cells of a centre. They follow each other in a list sorted by key.
-class CellIndex {
+class PoseCellIndex {
  public:
-  explicit CellIndex(const std::vector<Cell>& cells) {
+  explicit PoseCellIndex(const std::vector<Cell>& cells) {
     keys_.reserve(cells.size());
     for (const Cell& cell : cells) {
       if (keys_.empty() || (keys_.back() ^ cell.key) >> CellOf::kRotationBits != 0) {
@@ -172,7 +172,7 @@ class CellIndex {
 };
 
 /// A cell with those of the 64 cells around its mean (8 of centre, 8 of rotation) that agree with it.
-PoseCluster with_neighbours(const std::vector<Cell>& cells, const CellIndex& index, std::uint32_t seed,
+PoseCluster with_neighbours(const std::vector<Cell>& cells, const PoseCellIndex& index, std::uint32_t seed,
                             const CellOf& cell_of, const SamePose& same_pose) {
   const PoseCluster own = mean(cells[seed]);
   const RotationCoordinates rotation(own.q_view_model);
@@ -207,7 +207,7 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
                     [&](std::uint32_t a, std::uint32_t b) {
                       return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;
                     });
-  const CellIndex index(cells);
+  const PoseCellIndex index(cells);
   const SamePose same_pose(options);
   std::vector<PoseCluster> merged;
   for (std::size_t i = 0; i < seed_count; ++i) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "core/run_control.h"
 #include "core/vector_pair.h"
 
 namespace binpose {
@@ -16,8 +17,9 @@ class CellIndex {
   CellIndex(const std::vector<SurfacePoint>& points, float cell_size) : points_(points), inverse_(1 / cell_size) {}
 
   void insert(std::uint32_t index) { cells_[key(cell(points_[index].position))].push_back(index); }
-  void insert_all() {
-    for (std::uint32_t i = 0; i < points_.size(); ++i) insert(i);
+  /// Part of them when `control` interrupts.
+  void insert_all(const RunControl& control = {}) {
+    for (std::uint32_t i = 0; i < points_.size() && !control.interrupted_at(i); ++i) insert(i);
   }
 
   /// Index of the nearest point within `distance` <= the cell size whose normal is less than 60 degrees off, or -1.

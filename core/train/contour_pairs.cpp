@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <tuple>
 
 namespace binpose {
@@ -106,12 +105,14 @@ RatedContourPairs select_contour_pairs(std::span<const PooledContour> contours, 
   RatedContourPairs rated;
   std::vector<int> used(contours.size(), 0);
   // A heap gives the best one after the other, as most are never asked for; of equal ones the first.
-  std::vector<std::size_t> heap(values.size());
-  std::iota(heap.begin(), heap.end(), 0);
+  std::vector<std::size_t> heap;
   const auto worse = [&](std::size_t a, std::size_t b) {
     return values[a] != values[b] ? values[a] < values[b] : a > b;
   };
-  std::make_heap(heap.begin(), heap.end(), worse);
+  for (std::size_t i = 0; i < values.size() && !control.interrupted_at(i); ++i) {
+    heap.push_back(i);
+    std::push_heap(heap.begin(), heap.end(), worse);
+  }
   while (!heap.empty() && rated.pairs.size() < count && !control.interrupted()) {
     std::pop_heap(heap.begin(), heap.end(), worse);
     const std::size_t i = heap.back();

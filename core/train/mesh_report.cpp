@@ -63,7 +63,7 @@ void find_holes(const Mesh& mesh, const Shells& shells, double diameter, const R
   const RimPoints rims = scatter_on_rims(mesh, shells, spacing, control);
   const float gap = static_cast<float>(kGap / kRimSpacing * spacing);
   CellIndex index(rims.points, gap);
-  index.insert_all();
+  index.insert_all(control);
 
   struct Hole {
     std::size_t points = 0;

@@ -9,25 +9,17 @@
 
 #include "core/geometry/cell_index.h"
 #include "core/geometry/pose.h"
-#include "core/geometry/view_sphere.h"
-#include "core/train/sample_surface.h"
+#include "core/train/coarse_turns.h"
 
 namespace binpose {
 namespace {
 
 // Lengths as shares of the diameter.
-constexpr double kReach = 0.1;  // of the coarse search
-constexpr double kFirstGate = 0.7 * kReach;
+constexpr double kFirstGate = 0.7 * kCoarseReach;
 constexpr double kSecondGate = kFirstGate / 2;
-constexpr double kGridCell = 0.025;
 constexpr double kOnSurface = 0.014;  // a point this near to the surface is on it
 constexpr double kSamePose = 0.06;    // turns that move no corner of the box farther apart are one
 
-constexpr int kDirections = 400;  // 10 degrees apart
-constexpr int kTurns = 36;
-constexpr int kCoarsePoints = 80;
-constexpr double kCoarseShare = 0.6;
-constexpr std::size_t kMostRefined = 300;
 constexpr int kRefinements = 4;  // at each gate
 constexpr std::size_t kRefinePoints = 150;
 constexpr std::size_t kCoarseTargets = 1500;
@@ -41,104 +33,12 @@ constexpr float kFlank = 0.45F;  // radians, about 26 degrees, within which a tu
 constexpr double kDip = 0.002;   // of the share, between two peaks
 constexpr int kAxisProbes = 9;
 
-/// How near the surface is, by cell: 1 on it, falling to 0 at a reach.
-class Nearness {
- public:
-  Nearness(const std::vector<SurfacePoint>& surface, float diameter)
-      : cell_(static_cast<float>(kGridCell) * diameter), reach_(static_cast<float>(kReach) * diameter) {
-    Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY), high = Eigen::Array3f::Constant(-INFINITY);
-    for (const SurfacePoint& point : surface) {
-      low = low.min(point.position.array());
-      high = high.max(point.position.array());
-    }
-    low_ = low - reach_;
-    size_ = ((high - low + 2 * reach_) / cell_).cast<int>() + 1;
-    near_.assign(static_cast<std::size_t>(size_.prod()), 0);
-    for (const SurfacePoint& point : surface) stamp(point.position);
-  }
-
-  float at(const Eigen::Vector3f& p) const {
-    const Eigen::Array3i c = ((p.array() - low_) / cell_).floor().cast<int>();
-    return (c >= 0).all() && (c < size_).all() ? near_[index(c)] : 0;
-  }
-
- private:
-  std::size_t index(const Eigen::Array3i& c) const {
-    return (static_cast<std::size_t>(c[2]) * size_[1] + c[1]) * size_[0] + c[0];
-  }
-  void stamp(const Eigen::Vector3f& p) {
-    const Eigen::Array3i first = ((p.array() - reach_ - low_) / cell_).cast<int>().max(0);
-    const Eigen::Array3i last = ((p.array() + reach_ - low_) / cell_).cast<int>().min(size_ - 1);
-    for (int z = first[2]; z <= last[2]; ++z) {
-      for (int y = first[1]; y <= last[1]; ++y) {
-        for (int x = first[0]; x <= last[0]; ++x) {
-          const Eigen::Array3i c(x, y, z);
-          const Eigen::Vector3f middle = low_ + (c.cast<float>() + 0.5F) * cell_;
-          float& near = near_[index(c)];
-          near = std::max(near, 1 - (middle - p).squaredNorm() / (reach_ * reach_));
-        }
-      }
-    }
-  }
-
-  float cell_, reach_;
-  Eigen::Array3f low_;
-  Eigen::Array3i size_;
-  std::vector<float> near_;
-};
-
-struct RatedTurn {
-  Eigen::Isometry3f T;
-  double share;
-};
-
-Eigen::Matrix3f turn_towards(const Eigen::Vector3f& direction) {
-  return Eigen::Quaternionf::FromTwoVectors(Eigen::Vector3f::UnitZ(), direction).toRotationMatrix();
-}
-
-bool same_turn(const Eigen::Isometry3f& a, const Eigen::Isometry3f& b, float radius, float most) {
-  // The largest shift of a point at the radius is that of the rotation's angle.
-  const float cosine = ((a.linear().transpose() * b.linear()).trace() - 1) / 2;
-  return radius * std::sqrt(std::max(0.0F, 2 - 2 * cosine)) < most;
-}
-
-/// Turns about the middle by which the points come near the surface, best first, one of each kind.
-std::vector<RatedTurn> coarse_turns(const Nearness& nearness, const std::vector<SurfacePoint>& surface,
-                                    const Eigen::Vector3f& middle, float radius, const RunControl& control) {
-  const std::size_t count = std::min<std::size_t>(kCoarsePoints, surface.size());
-  std::vector<RatedTurn> turns;
-  for (const Eigen::Vector3f& direction : view_directions(kDirections)) {
-    if (control.interrupted()) return {};
-    const Eigen::Matrix3f tilt = turn_towards(direction);
-    for (int k = 0; k < kTurns; ++k) {
-      const float angle = static_cast<float>(2 * std::numbers::pi * k / kTurns);
-      const Eigen::Isometry3f T =
-          turn_about(middle, tilt * Eigen::AngleAxisf(angle, Eigen::Vector3f::UnitZ()).toRotationMatrix());
-      double sum = 0;
-      for (std::size_t i = 0; i < count; ++i) sum += nearness.at(T * surface[i].position);
-      if (sum >= kCoarseShare * static_cast<double>(count)) turns.push_back({T, sum / static_cast<double>(count)});
-    }
-  }
-  std::stable_sort(turns.begin(), turns.end(),
-                   [](const RatedTurn& a, const RatedTurn& b) { return a.share > b.share; });
-  std::vector<RatedTurn> kept;
-  for (const RatedTurn& turn : turns) {
-    if (kept.size() >= kMostRefined || control.interrupted()) break;
-    // 12 degrees: less than the grid's step would keep the flanks of each peak.
-    const bool repeats = std::any_of(kept.begin(), kept.end(), [&](const RatedTurn& other) {
-      return same_turn(other.T, turn.T, radius, 0.2F * radius);
-    });
-    if (!repeats) kept.push_back(turn);
-  }
-  return kept;
-}
-
 /// Share of the points that a turn leaves on the surface.
 double share_on_surface(const CellIndex& index, const std::vector<SurfacePoint>& points, const Eigen::Isometry3f& T,
-                        std::size_t most, float tolerance) {
+                        std::size_t most, float tolerance, const RunControl& control) {
   const std::size_t count = std::min(most, points.size());
   std::size_t on = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < count && !control.interrupted_at(i); ++i) {
     on += index.near({T * points[i].position, T.linear() * points[i].normal}, tolerance);
   }
   return static_cast<double>(on) / static_cast<double>(count);
@@ -172,30 +72,31 @@ std::pair<Eigen::Vector3f, Eigen::Vector3f> axis_of(const Eigen::Isometry3f& T, 
 /// Searches and judges turns; holds what every judgement needs.
 class TurnSearch {
  public:
-  TurnSearch(const std::vector<SurfacePoint>& dense, const std::vector<SurfacePoint>& surface, double diameter)
+  TurnSearch(const std::vector<SurfacePoint>& dense, const std::vector<SurfacePoint>& surface, double diameter,
+             const RunControl& control)
       : dense_(dense),
         surface_(surface),
+        control_(control),
         diameter_(static_cast<float>(diameter)),
         on_surface_(static_cast<float>(kOnSurface) * diameter_),
         sparse_(surface.begin(), surface.begin() + std::min<std::ptrdiff_t>(kCoarseTargets, std::ssize(surface))),
         sparsely_by_place_(sparse_, first_gate()),
         by_place_(surface, second_gate()),
         finely_by_place_(dense, on_surface_) {
-    sparsely_by_place_.insert_all();
-    by_place_.insert_all();
-    finely_by_place_.insert_all();
+    sparsely_by_place_.insert_all(control);
+    by_place_.insert_all(control);
+    finely_by_place_.insert_all(control);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const SurfacePoint& point : dense) sum += point.position.cast<double>();
     middle_ = (sum / static_cast<double>(dense.size())).cast<float>();
   }
 
   /// All turns that leave most of the surface on itself, the identity first, then best first.
-  std::vector<RatedTurn> find(const RunControl& control) const {
+  std::vector<RatedTurn> find() const {
     std::vector<RatedTurn> found = {{Eigen::Isometry3f::Identity(), 1}};
-    const Nearness nearness(surface_, diameter_);
     std::vector<Eigen::Isometry3f> settled;
-    for (const RatedTurn& coarse : coarse_turns(nearness, surface_, middle_, radius(), control)) {
-      if (control.interrupted()) break;
+    for (const RatedTurn& coarse : coarse_turns(surface_, middle_, diameter_, control_)) {
+      if (control_.interrupted()) break;
       const Eigen::Isometry3f near_by = settle(sparsely_by_place_, sparse_, kRefinePoints, first_gate(), coarse.T);
       const bool repeats = std::any_of(settled.begin(), settled.end(), [&](const Eigen::Isometry3f& other) {
         return same_turn(other, near_by, radius(), same_pose() / 3);
@@ -204,19 +105,19 @@ class TurnSearch {
       settled.push_back(near_by);
       add(settle(by_place_, surface_, kRefinePoints, second_gate(), near_by), found);
     }
-    complete(found, control);
+    complete(found);
     std::stable_sort(found.begin() + 1, found.end(),
                      [](const RatedTurn& a, const RatedTurn& b) { return a.share > b.share; });
-    return polished(peaks(found, control), control);
+    return polished(peaks(found));
   }
 
   /// Whether the part is one of revolution about the axis of a turn.
-  bool revolves_about_axis_of(const Eigen::Isometry3f& T, const RunControl& control) const {
+  bool revolves_about_axis_of(const Eigen::Isometry3f& T) const {
     const auto [direction, point] = axis_of(T, middle_);
     for (int i = 1; i <= kAxisProbes; ++i) {
       const float angle = static_cast<float>(2 * std::numbers::pi * std::fmod(0.6180339887 * i, 1.0));
       const Eigen::Isometry3f turn = turn_about(point, Eigen::AngleAxisf(angle, direction).toRotationMatrix());
-      if (control.interrupted() || share(turn, kJudgedPoints) < kSameShare) return false;
+      if (control_.interrupted() || share(turn, kJudgedPoints) < kSameShare) return false;
     }
     return true;
   }
@@ -230,7 +131,7 @@ class TurnSearch {
   float second_gate() const { return static_cast<float>(kSecondGate) * diameter_; }
 
   double share(const Eigen::Isometry3f& T, std::size_t most) const {
-    return share_on_surface(finely_by_place_, surface_, T, most, on_surface_);
+    return share_on_surface(finely_by_place_, surface_, T, most, on_surface_, control_);
   }
 
   /// Point-to-plane steps that draw the first points of the surface, turned, to a target.
@@ -240,7 +141,7 @@ class TurnSearch {
   Eigen::Isometry3f settle(const CellIndex& index, const std::vector<SurfacePoint>& target, std::size_t most,
                            float gate, Eigen::Isometry3f T) const {
     const std::size_t count = std::min(most, surface_.size());
-    for (int i = 0; i < kRefinements; ++i) {
+    for (int i = 0; i < kRefinements && !control_.interrupted(); ++i) {
       Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
       Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
       for (std::size_t k = 0; k < count; ++k) {
@@ -265,8 +166,8 @@ class TurnSearch {
 
   /// The turns with the symmetric ones drawn to where they fit best: a small socket or key leaves a whole range of
   /// angles on the surface, to within the tolerance, and what was found lies anywhere in it.
-  std::vector<RatedTurn> polished(std::vector<RatedTurn> turns, const RunControl& control) const {
-    for (std::size_t i = 1; i < turns.size() && turns[i].share >= kSameShare && !control.interrupted(); ++i) {
+  std::vector<RatedTurn> polished(std::vector<RatedTurn> turns) const {
+    for (std::size_t i = 1; i < turns.size() && turns[i].share >= kSameShare && !control_.interrupted(); ++i) {
       Eigen::Isometry3f T = turns[i].T;
       for (int round = 0; round < 2; ++round) T = settle(finely_by_place_, dense_, kPolishPoints, on_surface_, T);
       if (share(T, kJudgedPoints) >= kSameShare) turns[i].T = T;
@@ -284,11 +185,11 @@ class TurnSearch {
   }
 
   /// Leaves out turns on the flank of a better one: halfway to it the part fits no worse.
-  std::vector<RatedTurn> peaks(const std::vector<RatedTurn>& turns, const RunControl& control) const {
+  std::vector<RatedTurn> peaks(const std::vector<RatedTurn>& turns) const {
     std::vector<RatedTurn> kept;
     for (const RatedTurn& turn : turns) {
       const bool on_flank = std::any_of(kept.begin(), kept.end(), [&](const RatedTurn& better) {
-        return same_turn(better.T, turn.T, radius(), kFlank * radius()) && !control.interrupted() &&
+        return same_turn(better.T, turn.T, radius(), kFlank * radius()) && !control_.interrupted() &&
                share(halfway(better.T, turn.T, middle_), kJudgedPoints) >= turn.share - kDip;
       });
       if (!on_flank) kept.push_back(turn);
@@ -297,10 +198,10 @@ class TurnSearch {
   }
 
   /// Adds the products of turns: teeth that stand closer than the coarse search's step.
-  void complete(std::vector<RatedTurn>& found, const RunControl& control) const {
+  void complete(std::vector<RatedTurn>& found) const {
     for (std::size_t i = 1; i < found.size(); ++i) {
       for (std::size_t j = 1; j <= i; ++j) {
-        if (found.size() >= kMostSimilar || control.interrupted()) return;
+        if (found.size() >= kMostSimilar || control_.interrupted()) return;
         add(found[i].T * found[j].T, found);
       }
     }
@@ -308,6 +209,7 @@ class TurnSearch {
 
   const std::vector<SurfacePoint>& dense_;
   const std::vector<SurfacePoint>& surface_;
+  const RunControl& control_;
   float diameter_, on_surface_;
   std::vector<SurfacePoint> sparse_;  ///< evenly spread all the same
   CellIndex sparsely_by_place_, by_place_, finely_by_place_;
@@ -318,12 +220,12 @@ class TurnSearch {
 
 SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, const std::vector<SurfacePoint>& surface,
                                     double diameter, const RunControl& control) {
-  const TurnSearch search(dense, surface, diameter);
-  const std::vector<RatedTurn> turns = search.find(control);
+  const TurnSearch search(dense, surface, diameter, control);
+  const std::vector<RatedTurn> turns = search.find();
   SelfSimilarity result;
   Symmetry& symmetry = result.symmetry;
   for (std::size_t i = 1; i < turns.size() && turns[i].share >= kSameShare && !symmetry.has_axis; ++i) {
-    if (!search.revolves_about_axis_of(turns[i].T, control)) continue;
+    if (!search.revolves_about_axis_of(turns[i].T)) continue;
     const auto [direction, point] = axis_of(turns[i].T, search.middle());
     symmetry.has_axis = true;
     symmetry.axis_direction = direction.cast<double>();
@@ -350,7 +252,7 @@ SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, cons
 std::vector<SurfacePoint> telling_points(const std::vector<SurfacePoint>& dense, const std::vector<Pose>& similar,
                                          double diameter, const RunControl& control) {
   CellIndex index(dense, static_cast<float>(kOnSurface * diameter));
-  index.insert_all();
+  index.insert_all(control);
   std::vector<SurfacePoint> telling;
   for (const SurfacePoint& point : dense) {
     if (control.interrupted()) break;

@@ -86,7 +86,10 @@ void select_pairs(std::span<const VectorPair> pairs, const std::vector<ViewMask>
       occurrence_probability(model.pair_points, pairs, FeatureBins(model.params.bin_width), control, weights);
   if (control.interrupted()) return;
   std::vector<double> values(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) values[i] = pair_value(obs[i], ph[i], model.params);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (control.interrupted_at(i)) return;
+    values[i] = pair_value(obs[i], ph[i], model.params);
+  }
   for (const std::size_t i : best_pairs(values, count, control)) {
     model.pairs.push_back(pairs[i]);
     // A vote for a frequent feature says less: its false votes are more.

@@ -55,7 +55,7 @@ std::vector<double> occurrence_probability(std::span<const SurfacePoint> points,
     total += weight;
   }
   std::vector<double> probability(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
+  for (std::size_t i = 0; i < pairs.size() && !control.interrupted_at(i); ++i) {
     probability[i] = histogram[bin_of_pair[i]] / total;  // Eq. (4)
   }
   return probability;
