@@ -3,13 +3,9 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-namespace binpose {
+#include "core/geometry/surface_point.h"
 
-/// A surface point with its outward normal; metres.
-struct SurfacePoint {
-  Eigen::Vector3f position;
-  Eigen::Vector3f normal;
-};
+namespace binpose {
 
 /// A vector pair [paper, Fig. 1]: start point P and end points Q1, Q2, as indices into a list of surface points.
 struct VectorPair {

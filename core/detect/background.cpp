@@ -26,9 +26,10 @@ bool is_outside(const SearchSpace& space, const Eigen::Vector3d& p_scene, double
 void mark_outside(DepthMap& map, const SearchSpace& space, double diameter) {
   if (space.regions.empty() && !space.support_plane && !space.bin_interior) return;
   const double margin = plane_tolerance(map, static_cast<float>(diameter));
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (!map.measured(static_cast<int>(i))) continue;
-    if (is_outside(space, map.T_scene_view * map.points[i].cast<double>(), diameter, margin)) map.background[i] = 1;
+    const Eigen::Vector3d p_scene = map.T_scene_view * map.pixels[i].position.cast<double>();
+    if (is_outside(space, p_scene, diameter, margin)) map.background[i] = 1;
   }
 }
 

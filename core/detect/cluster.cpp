@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/detect/thin_clusters.h"
+#include "core/parallel.h"
 
 namespace binpose {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 /// Side of a rotation cell in units of the quaternion's components: neighbours differ by about 23 degrees.
 constexpr float kRotationCell = 0.2F;
 constexpr int kRotationCells = 8;  // cover [-0.8, 0.8]
+
+constexpr std::size_t kVotesPerTask = 4096;
+constexpr std::size_t kSeedsPerTask = 64;
 
 /// Numbers of a pose cell: centre x, y, z, the quaternion's largest component, and the bins of its other three.
 struct CellOf {
@@ -100,12 +104,12 @@ void add(Cell& cell, float weight, const Eigen::Vector3f& centre, const Eigen::V
 /// The cells that have votes, by key; none when stopped.
 std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cell_of, const RunControl& control) {
   std::vector<KeyedVote> keyed(votes.size());
-  for (std::size_t i = 0; i < votes.size(); ++i) {
+  parallel_for_blocks(votes.size(), kVotesPerTask, control.threads, [&](std::size_t i) {
     const RotationCoordinates rotation(votes[i].q_view_model);
     keyed[i] = {cell_of.centre_key(cell_of.centre_coordinates(votes[i].centre).cast<int>()) |
                     CellOf::rotation_key(rotation.largest, rotation.rest.cast<int>()),
                 static_cast<std::uint32_t>(i)};
-  }
+  });
   radix_sort(keyed, cell_of.key_bits(), control);
   if (control.stop.stop_requested()) return {};
   std::vector<Cell> cells;
@@ -209,11 +213,11 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
                     });
   const PoseCellIndex index(cells);
   const SamePose same_pose(options);
-  std::vector<PoseCluster> merged;
-  for (std::size_t i = 0; i < seed_count; ++i) {
-    if (control.stop.stop_requested()) return {};
-    merged.push_back(with_neighbours(cells, index, seeds[i], cell_of, same_pose));
-  }
+  std::vector<PoseCluster> merged(seed_count);
+  parallel_for_blocks(seed_count, kSeedsPerTask, control.threads, [&](std::size_t i) {
+    if (!control.stop.stop_requested()) merged[i] = with_neighbours(cells, index, seeds[i], cell_of, same_pose);
+  });
+  if (control.stop.stop_requested()) return {};
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });
 

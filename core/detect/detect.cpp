@@ -12,6 +12,7 @@
 #include "core/geometry/contours.h"
 #include "core/geometry/depth_map.h"
 #include "core/geometry/normals.h"
+#include "core/parallel.h"
 
 namespace binpose {
 namespace {
@@ -84,8 +85,13 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   }
   if (control.stop.stop_requested()) return control.status();
 
-  const auto describe_one = [&](const Candidate& candidate) {
-    return describe(candidate, finest, *models[candidate.model_index], verification[candidate.model_index], params);
+  const auto describe_all = [&](const std::vector<Candidate>& all) {
+    std::vector<PoseHypothesis> described(all.size());
+    parallel_for(static_cast<int>(all.size()), control.threads, [&](int i) {
+      const int m = all[i].model_index;
+      described[i] = describe(all[i], finest, *models[m], verification[m], params);
+    });
+    return described;
   };
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
@@ -96,7 +102,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     Ranking ranking = rank(finest, models, std::move(candidates), options, control);
     if (control.stop.stop_requested()) return control.status();
     candidates = std::move(ranking.accepted);
-    for (const Candidate& candidate : ranking.rejected) result.rejected.push_back(describe_one(candidate));
+    result.rejected = describe_all(ranking.rejected);
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   if (candidates.size() > static_cast<std::size_t>(params.max_results)) {
@@ -105,8 +111,8 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   }
   for (Candidate& candidate : candidates) {
     std::erase_if(candidate.occluded_by, [&](int i) { return i >= params.max_results; });
-    result.hypotheses.push_back(describe_one(candidate));
   }
+  result.hypotheses = describe_all(candidates);
   if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats));
   stats.total_seconds = seconds_since(start);
   return result;

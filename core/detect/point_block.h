@@ -66,11 +66,7 @@ struct LaneBuffer {
     z[lane] = p.z();
   }
   [[gnu::always_inline]] LanePoints load() const {
-    LanePoints p;
-    __builtin_memcpy(&p.x, x, sizeof(x));
-    __builtin_memcpy(&p.y, y, sizeof(y));
-    __builtin_memcpy(&p.z, z, sizeof(z));
-    return p;
+    return {load_lanes(x), load_lanes(y), load_lanes(z)};
   }
 };
 
@@ -86,6 +82,38 @@ struct LaneBuffer {
   return inside ? pixel : LaneInts{} - 1;
 }
 
+/// Eight surface points, coordinate by coordinate.
+struct SurfaceLanes {
+  LanePoints position, normal;
+
+  /// @param source  gives the point of each lane; one load takes all of it, and the eight are transposed.
+  template <typename Source>
+  [[gnu::always_inline]] explicit SurfaceLanes(Source&& source) {
+    Lanes row[kLanes];
+#pragma GCC unroll 8
+    for (int i = 0; i < kLanes; ++i) row[i] = load_lanes(source(i).position.data());
+    Lanes low[4], high[4];  // columns 0, 1, 4, 5 and 2, 3, 6, 7 of two rows each
+    for (int i = 0; i < 4; ++i) {
+      low[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+      high[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    Lanes column_0_4[2], column_1_5[2], column_2[2], column_3[2];  // of four rows each
+    for (int i = 0; i < 2; ++i) {
+      column_0_4[i] = __builtin_shufflevector(low[2 * i], low[2 * i + 1], 0, 1, 8, 9, 4, 5, 12, 13);
+      column_1_5[i] = __builtin_shufflevector(low[2 * i], low[2 * i + 1], 2, 3, 10, 11, 6, 7, 14, 15);
+      column_2[i] = __builtin_shufflevector(high[2 * i], high[2 * i + 1], 0, 1, 8, 9, 4, 5, 12, 13);
+      column_3[i] = __builtin_shufflevector(high[2 * i], high[2 * i + 1], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    position.x = __builtin_shufflevector(column_0_4[0], column_0_4[1], 0, 1, 2, 3, 8, 9, 10, 11);
+    position.y = __builtin_shufflevector(column_1_5[0], column_1_5[1], 0, 1, 2, 3, 8, 9, 10, 11);
+    position.z = __builtin_shufflevector(column_2[0], column_2[1], 0, 1, 2, 3, 8, 9, 10, 11);
+    normal.x = __builtin_shufflevector(column_3[0], column_3[1], 0, 1, 2, 3, 8, 9, 10, 11);
+    normal.y = __builtin_shufflevector(column_0_4[0], column_0_4[1], 4, 5, 6, 7, 12, 13, 14, 15);
+    normal.z = __builtin_shufflevector(column_1_5[0], column_1_5[1], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+  static_assert(sizeof(SurfacePoint) == sizeof(Lanes) && sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+};
+
 /// Surface points under a pose, and what the sensor measured where they fall; eight at a time.
 struct PointBlock {
   LanePoints point, normal;              ///< of the model, view frame; lanes without a point have z = -1
@@ -96,28 +124,18 @@ struct PointBlock {
   [[gnu::always_inline]] void load(const std::vector<SurfacePoint>& surface, std::span<const std::uint16_t> indices,
                                    const Eigen::Isometry3f& T_view_model) {
     const int count = static_cast<int>(std::min<std::size_t>(kLanes, indices.size()));
-    LaneBuffer positions, normals;
-    for (int i = 0; i < kLanes; ++i) {
-      const SurfacePoint& source = surface[indices[i < count ? i : 0]];
-      positions.set(i, source.position);
-      normals.set(i, source.normal);
-    }
-    point = transform(T_view_model, positions.load());
-    normal = rotate(T_view_model, normals.load());
+    const SurfaceLanes model([&](int i) -> const SurfacePoint& { return surface[indices[i < count ? i : 0]]; });
+    point = transform(T_view_model, model.position);
+    normal = rotate(T_view_model, model.normal);
     for (int i = count; i < kLanes; ++i) point.z[i] = -1;
   }
 
   /// Finds the pixel of each point and takes what was measured there.
   [[gnu::always_inline]] void look_up(const DepthMap& map) {
     pixel = pixels_of(map, point);
-    LaneBuffer positions, normals;
-    for (int i = 0; i < kLanes; ++i) {
-      const int at = std::max(0, pixel[i]);
-      positions.set(i, map.points[at]);
-      normals.set(i, map.normals[at]);
-    }
-    scene_point = positions.load();
-    scene_normal = normals.load();
+    const SurfaceLanes scene([&](int i) -> const SurfacePoint& { return map.pixels[std::max(0, pixel[i])]; });
+    scene_point = scene.position;
+    scene_normal = scene.normal;
     const Lanes zero = {};
     scene_point.z = pixel >= 0 ? scene_point.z : zero;
     scene_normal.z = pixel >= 0 ? scene_normal.z : zero;

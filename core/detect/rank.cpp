@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
+
+#include "core/parallel.h"
 
 namespace binpose {
 namespace {
@@ -24,7 +27,7 @@ void own_pixels(const DepthMap& map, const Model& model, const Candidate& candid
     for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
       for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
         const int i = row * map.width + column;
-        if (map.measured(i) && std::abs(normal.dot(map.points[i] - p)) <= tolerance) owner[i] = index;
+        if (map.measured(i) && std::abs(normal.dot(map.pixels[i].position - p)) <= tolerance) owner[i] = index;
       }
     }
   }
@@ -39,7 +42,8 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
     const Eigen::Vector3f p = candidate.T_view_model * model.surface[i].position;
     const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
     if (pixel < 0 || owner[pixel] == kNobody || owner[pixel] == index) continue;
-    if (map.points[pixel].z() < p.z() - kInFront * static_cast<float>(model.diameter)) ++hidden_by[owner[pixel]];
+    if (map.pixels[pixel].position.z() < p.z() - kInFront * static_cast<float>(model.diameter))
+      ++hidden_by[owner[pixel]];
   }
   std::vector<int> occluders;
   for (const auto& [other, count] : hidden_by) {
@@ -58,17 +62,22 @@ class Line {
         options_(options),
         control_(control),
         candidates_(std::move(candidates)),
-        owner_(map.points.size(), kNobody) {
-    std::stable_sort(candidates_.begin(), candidates_.end(), better);
+        variants_(candidates_.size()),
+        order_(candidates_.size()),
+        owner_(map.pixels.size(), kNobody) {
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
+    std::iota(order_.begin(), order_.end(), 0);
+    choose_variants();
   }
 
   /// The next that score at least `min_score`, at most `limit` of them.
   std::vector<Candidate> accept(double min_score, std::size_t limit) {
     std::vector<Candidate> accepted;
-    while (next_ < candidates_.size() && accepted.size() < limit && candidates_[next_].score() >= min_score &&
+    while (next_ < order_.size() && accepted.size() < limit && candidates_[order_[next_]].score() >= min_score &&
            !control_.stop.stop_requested()) {
       if (!stands_firm()) continue;
-      const Candidate& candidate = candidates_[next_++];
+      const Candidate& candidate = candidates_[order_[next_++]];
       own_pixels(map_, *models_[candidate.model_index], candidate,
                  options_.verification[candidate.model_index].tolerance, accepted_count_++, owner_);
       accepted.push_back(candidate);
@@ -80,18 +89,29 @@ class Line {
   const std::vector<int>& owner() const { return owner_; }
 
  private:
-  static bool better(const Candidate& a, const Candidate& b) { return a.score() > b.score(); }
+  VariantChoice variant_of(const Candidate& candidate) const {
+    return choose_variant(
+        map_, *models_[candidate.model_index], candidate.T_view_model, options_.verification[candidate.model_index],
+        [&](const Eigen::Isometry3f& T_view_model) { return options_.allowed(candidate.model_index, T_view_model); });
+  }
+
+  /// Of all that will stand first, in parallel: the choice does not depend on what others own.
+  void choose_variants() {
+    parallel_for(static_cast<int>(candidates_.size()), control_.threads, [&](int i) {
+      if (candidates_[i].score() < options_.min_score || control_.stop.stop_requested()) return;
+      variants_[i] = variant_of(candidates_[i]);
+    });
+  }
 
   /// Judges the first in line anew; sends it back to its place if it lost pixels to a better one.
   bool stands_firm() {
-    Candidate& candidate = candidates_[next_];
+    const int i = order_[next_];
+    Candidate& candidate = candidates_[i];
     const Model& model = *models_[candidate.model_index];
     const VerifyOptions& options = options_.verification[candidate.model_index];
     const float before = candidate.score();
     if (!candidate.has_variant) {
-      VariantChoice choice = choose_variant(
-          map_, model, candidate.T_view_model, options,
-          [&](const Eigen::Isometry3f& T_view_model) { return options_.allowed(candidate.model_index, T_view_model); });
+      VariantChoice choice = variants_[i] ? *std::move(variants_[i]) : variant_of(candidate);
       candidate.has_variant = true;
       candidate.T_view_model = choice.T_view_model;
       candidate.confidence = choice.confidence;
@@ -99,8 +119,10 @@ class Line {
     }
     candidate.evidence = verify(map_, model, candidate.T_view_model, options, &owner_);
     if (candidate.score() >= before) return true;
-    const auto first = candidates_.begin() + static_cast<std::ptrdiff_t>(next_);
-    std::rotate(first, first + 1, std::upper_bound(first + 1, candidates_.end(), candidate, better));
+    const auto first = order_.begin() + static_cast<std::ptrdiff_t>(next_);
+    std::rotate(first, first + 1, std::upper_bound(first + 1, order_.end(), i, [&](int a, int b) {
+                  return candidates_[a].score() > candidates_[b].score();
+                }));
     return false;
   }
 
@@ -109,6 +131,8 @@ class Line {
   const RankOptions& options_;
   const RunControl& control_;
   std::vector<Candidate> candidates_;
+  std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen ahead
+  std::vector<int> order_;                              // of the candidates
   std::size_t next_ = 0;
   int accepted_count_ = 0;
   std::vector<int> owner_;
@@ -121,11 +145,10 @@ Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vec
   Line line(map, models, std::move(candidates), options, control);
   Ranking ranking;
   ranking.accepted = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
-  for (std::size_t i = 0; i < ranking.accepted.size(); ++i) {
+  parallel_for(static_cast<int>(ranking.accepted.size()), control.threads, [&](int i) {
     Candidate& candidate = ranking.accepted[i];
-    candidate.occluded_by =
-        find_occluders(map, *models[candidate.model_index], candidate, static_cast<int>(i), line.owner());
-  }
+    candidate.occluded_by = find_occluders(map, *models[candidate.model_index], candidate, i, line.owner());
+  });
   constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
   ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(options.max_rejected));
   return ranking;

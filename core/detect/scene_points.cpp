@@ -34,7 +34,7 @@ ScenePoints down_sample(const DepthMap& map, int block_size) {
     for (int column = 0; column < scene.columns; ++column) {
       const int pixel = middle_pixel(map, column * block_size, row * block_size, block_size);
       scene.of_block.push_back(pixel < 0 ? -1 : static_cast<int>(scene.points.size()));
-      if (pixel >= 0) scene.points.push_back({map.points[pixel], map.normals[pixel]});
+      if (pixel >= 0) scene.points.push_back(map.pixels[pixel]);
     }
   }
   return scene;

@@ -23,7 +23,7 @@ struct ViewPlane {
 /// Every n-th pixel with a normal, so that about `count` are taken.
 std::vector<int> evenly_taken(const DepthMap& map, int count) {
   std::vector<int> with_normal;
-  for (int i = 0; i < static_cast<int>(map.points.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(map.pixels.size()); ++i) {
     if (map.has_normal(i)) with_normal.push_back(i);
   }
   std::vector<int> taken;
@@ -35,8 +35,8 @@ std::vector<int> evenly_taken(const DepthMap& map, int count) {
 }
 
 bool on_plane(const DepthMap& map, int i, const ViewPlane& plane, float tolerance) {
-  return std::abs(plane.normal.dot(map.points[i]) - plane.offset) <= tolerance &&
-         plane.normal.dot(map.normals[i]) >= kSameNormalCosine;
+  return std::abs(plane.normal.dot(map.pixels[i].position) - plane.offset) <= tolerance &&
+         plane.normal.dot(map.pixels[i].normal) >= kSameNormalCosine;
 }
 
 /// Least-squares plane through the probes that lie on a plane.
@@ -47,7 +47,7 @@ ViewPlane refit(const DepthMap& map, const std::vector<int>& probes, const ViewP
   int count = 0;
   for (const int i : probes) {
     if (!on_plane(map, i, plane, tolerance)) continue;
-    const Eigen::Vector3d p = map.points[i].cast<double>();
+    const Eigen::Vector3d p = map.pixels[i].position.cast<double>();
     sum += p;
     squares += p * p.transpose();
     ++count;
@@ -67,11 +67,12 @@ std::optional<ViewPlane> find_plane(const DepthMap& map, float diameter, float t
   std::optional<ViewPlane> best;
   auto most = static_cast<int>(kLeastShare * static_cast<double>(probes.size()));
   for (const int seed : evenly_taken(map, kSeeds)) {
-    const ViewPlane plane{map.normals[seed], map.normals[seed].dot(map.points[seed])};
+    const SurfacePoint& at = map.pixels[seed];
+    const ViewPlane plane{at.normal, at.normal.dot(at.position)};
     int on = 0, behind = 0;
     for (const int i : probes) {
       on += on_plane(map, i, plane, 2 * tolerance);
-      behind += plane.normal.dot(map.points[i]) < plane.offset - 4 * tolerance;
+      behind += plane.normal.dot(map.pixels[i].position) < plane.offset - 4 * tolerance;
     }
     if (on <= most || behind > kMostBehind * static_cast<double>(probes.size())) continue;
     float extent = 0;
@@ -91,7 +92,7 @@ bool mark_support_plane(DepthMap& map, float diameter) {
   const float tolerance = plane_tolerance(map, diameter);
   const std::optional<ViewPlane> plane = find_plane(map, diameter, tolerance);
   if (!plane) return false;
-  for (int i = 0; i < static_cast<int>(map.points.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(map.pixels.size()); ++i) {
     map.background[i] = map.has_normal(i) && on_plane(map, i, *plane, tolerance) ? 1 : 0;
   }
   return true;

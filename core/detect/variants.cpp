@@ -26,8 +26,8 @@ float telling_evidence(const DepthMap& map, const Model& model, const Eigen::Iso
     const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
     if (pixel < 0 || !map.measured(pixel)) continue;
     const Eigen::Vector3f normal = T_view_model.linear() * model.telling_points[i].normal;
-    const float distance = normal.dot(map.points[pixel] - p);
-    if (map.points[pixel].z() < p.z() - own_depth) continue;
+    const float distance = normal.dot(map.pixels[pixel].position - p);
+    if (map.pixels[pixel].position.z() < p.z() - own_depth) continue;
     const float facing = std::max(0.0F, -normal.dot(p) / p.norm());
     sum += std::abs(distance) <= options.tolerance ? facing : -facing;
   }

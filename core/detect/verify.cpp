@@ -54,7 +54,7 @@ struct OutlineBlock {
                           point.z + distance * outward.z};
     const LaneInts pixel = pixels_of(map, q);
     Lanes depth = {};
-    for (int i = 0; i < kLanes; ++i) depth[i] = map.points[std::max(0, pixel[i])].z();
+    for (int i = 0; i < kLanes; ++i) depth[i] = map.pixels[std::max(0, pixel[i])].position.z();
     measured = (pixel >= 0) & (depth > 0) & (point.z > 0);
     const Lanes zero = {}, one = zero + 1;
     const Lanes towards = -normal.z > 0.05F ? -normal.z : zero + 0.05F;
@@ -174,7 +174,7 @@ float alignment_score(const DepthMap& map, const Model& model, const Eigen::Isom
     const Eigen::Vector3f p = T_view_model * model.surface[i].position;
     const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
     const bool measured = pixel >= 0 && map.measured(pixel);
-    sum += measured ? std::min(cutoff, (map.points[pixel] - p).norm()) : cutoff;
+    sum += measured ? std::min(cutoff, (map.pixels[pixel].position - p).norm()) : cutoff;
   }
   return 1 - sum / (cutoff * static_cast<float>(std::max<std::size_t>(1, count)));
 }

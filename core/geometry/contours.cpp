@@ -18,7 +18,8 @@ bool ends(const DepthMap& map, int u, int v, const int (&direction)[2], float st
     if (column < 0 || row < 0 || column >= map.width || row >= map.height) break;
     const int j = row * map.width + column;
     if (map.measured(j)) {
-      return map.normals[i].dot(map.points[j] - map.points[i]) < -step && map.points[j].z() > map.points[i].z();
+      return map.pixels[i].normal.dot(map.pixels[j].position - map.pixels[i].position) < -step &&
+             map.pixels[j].position.z() > map.pixels[i].position.z();
     }
   }
   return unmeasured == Unmeasured::kFar;
@@ -26,10 +27,10 @@ bool ends(const DepthMap& map, int u, int v, const int (&direction)[2], float st
 
 /// Whether the surface at a pixel off the image's border goes on in all directions: the common case, told fast.
 bool goes_on(const DepthMap& map, int i, float step) {
-  const Eigen::Vector3f& n = map.normals[i];
-  const float least = n.dot(map.points[i]) - step;
+  const Eigen::Vector3f& n = map.pixels[i].normal;
+  const float least = n.dot(map.pixels[i].position) - step;
   for (const auto& direction : kDirections) {
-    const Eigen::Vector3f& p = map.points[i + direction[1] * map.width + direction[0]];
+    const Eigen::Vector3f& p = map.pixels[i + direction[1] * map.width + direction[0]].position;
     if (!(p.z() > 0) || n.dot(p) < least) return false;
   }
   return true;
@@ -50,7 +51,7 @@ Eigen::Vector2f outward_at(const DepthMap& map, int u, int v, float step, Unmeas
 }  // namespace
 
 void find_contours(DepthMap& map, float step, Unmeasured unmeasured, const RunControl& control) {
-  std::vector<Eigen::Vector2f> outward(map.points.size(), Eigen::Vector2f::Zero());
+  std::vector<Eigen::Vector2f> outward(map.pixels.size(), Eigen::Vector2f::Zero());
   parallel_for(map.height, control.threads, [&](int v) {
     if (control.interrupted()) return;
     for (int u = 0; u < map.width; ++u) {
@@ -61,11 +62,11 @@ void find_contours(DepthMap& map, float step, Unmeasured unmeasured, const RunCo
     }
   });
   map.contours.clear();
-  map.contour_at.assign(map.points.size(), -1);
+  map.contour_at.assign(map.pixels.size(), -1);
   for (std::size_t i = 0; i < outward.size(); ++i) {
     if (outward[i] == Eigen::Vector2f::Zero()) continue;
     map.contour_at[i] = static_cast<int>(map.contours.size());
-    map.contours.push_back({map.points[i], map.normals[i], {outward[i].x(), outward[i].y(), 0}});
+    map.contours.push_back({map.pixels[i].position, map.pixels[i].normal, {outward[i].x(), outward[i].y(), 0}});
   }
 }
 

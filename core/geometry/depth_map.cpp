@@ -88,7 +88,7 @@ Eigen::Vector3f between_neighbours(const DepthMap& map, int u, int v) {
   int count = 0;
   for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
     for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
-      const float z = map.points[static_cast<std::size_t>(row) * map.width + column].z();
+      const float z = map.pixels[static_cast<std::size_t>(row) * map.width + column].position.z();
       if (!(z > 0)) continue;
       least = std::min(least, z);
       most = std::max(most, z);
@@ -112,7 +112,7 @@ void fill_specks(DepthMap& map, const RunControl& control) {
       if (point.z() > 0) filled.emplace_back(i, point);
     }
   }
-  for (const auto& [i, point] : filled) map.points[i] = point;
+  for (const auto& [i, point] : filled) map.pixels[i].position = point;
 }
 
 }  // namespace
@@ -173,18 +173,17 @@ DepthMap depth_map(const SensorView& view, double pixel_size, const RunControl& 
   map.width = static_cast<int>(std::lround(width_tan / pixel_tan)) + 1;
   map.height = static_cast<int>(std::lround(height_tan / pixel_tan)) + 1;
   const std::size_t count = static_cast<std::size_t>(map.width) * map.height;
-  map.points.assign(count, Eigen::Vector3f::Zero());
-  map.normals.assign(count, Eigen::Vector3f::Zero());
+  map.pixels.assign(count, {Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
   map.background.assign(count, 0);
   if (control.interrupted()) return map;
   for (std::size_t i = 0; i < view.points.size() && !control.interrupted_at(i); ++i) {
     const int pixel = map.pixel_of(view.points[i]);
-    if (pixel < 0 || (map.measured(pixel) && map.points[pixel].z() <= view.points[i].z())) continue;
-    map.points[pixel] = view.points[i];
+    if (pixel < 0 || (map.measured(pixel) && map.pixels[pixel].position.z() <= view.points[i].z())) continue;
+    map.pixels[pixel].position = view.points[i];
     if (view.normals.empty()) continue;
     const Eigen::Vector3f& n = view.normals[i];
     const float sign = n.dot(view.points[i]) > 0 ? -1.0F : 1.0F;
-    map.normals[pixel] =
+    map.pixels[pixel].normal =
         n.allFinite() && n.norm() > 0.5F ? Eigen::Vector3f(sign * n.normalized()) : Eigen::Vector3f::Zero();
   }
   if (view.normals.empty()) fill_specks(map, control);

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "core/geometry/point_cloud.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/surface_point.h"
 #include "core/run_control.h"
 
 namespace binpose {
@@ -29,15 +30,15 @@ struct DepthMap {
   float cx = 0, cy = 0;  ///< principal point, pixels; (0, 0) = centre of the first pixel
   float pixel_size = 0;  ///< metres that a pixel spans across the view at the median depth
   float noise = 0;       ///< standard deviation of the measurement along the surface normal, metres; 0: not known
-  std::vector<Eigen::Vector3f> points;   ///< row by row, view frame; z = 0: nothing measured
-  std::vector<Eigen::Vector3f> normals;  ///< unit, towards the sensor; zero: none
+  /// Row by row, view frame. position.z = 0: nothing measured; normals are unit, towards the sensor, or zero: none.
+  std::vector<SurfacePoint> pixels;
   std::vector<std::uint8_t> background;  ///< 1: belongs to the support plane
 
   std::vector<ContourPoint> contours;  ///< see contours.h
   std::vector<int> contour_at;         ///< per pixel: index into `contours`, or -1
 
-  bool measured(int i) const { return points[i].z() > 0; }
-  bool has_normal(int i) const { return normals[i].z() != 0; }
+  bool measured(int i) const { return pixels[i].position.z() > 0; }
+  bool has_normal(int i) const { return pixels[i].normal.z() != 0; }
   /// Index of the pixel that a point of the view frame falls into, or -1 outside of the image. z must be > 0.
   int pixel_of(const Eigen::Vector3f& p) const {
     const float u = focal * p.x() / p.z() + cx + 0.5F, v = focal * p.y() / p.z() + cy + 0.5F;

@@ -26,7 +26,7 @@ struct RayImage {
     for (std::vector<float>* values : {&x, &y, &z, &w}) values->assign(count, 0);
     for (int v = 0; v < map.height; ++v) {
       for (int u = 0; u < map.width; ++u) {
-        const Eigen::Vector3f& p = map.points[static_cast<std::size_t>(v) * map.width + u];
+        const Eigen::Vector3f& p = map.pixels[static_cast<std::size_t>(v) * map.width + u].position;
         if (!(p.z() > 0)) continue;
         const std::size_t i = at(u, v);
         z[i] = p.z();
@@ -111,7 +111,7 @@ void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, std::vector
       const int i = v * map.width + u + lane;
       if (!map.measured(i)) continue;
       const Eigen::Vector3f normal = -Eigen::Vector3f(a[lane], b[lane], c[lane]) / length[lane];
-      map.normals[i] = good[lane] != 0 ? normal : Eigen::Vector3f(0, 0, 0);
+      map.pixels[i].normal = good[lane] != 0 ? normal : Eigen::Vector3f(0, 0, 0);
       deviations[i] = steady[lane] != 0 ? off[lane] : -1;
     }
   }
@@ -137,7 +137,7 @@ double normal_error(double noise, double pixel_size, int radius) {
 }
 
 void estimate_normals(DepthMap& map, int radius, const RunControl& control) {
-  std::vector<float> deviations(map.points.size(), -1);
+  std::vector<float> deviations(map.pixels.size(), -1);
   const RayImage rays(map, radius);
   parallel_for(map.height, control.threads, [&](int v) {
     if (!control.interrupted()) fit_row(map, rays, v, radius, deviations);

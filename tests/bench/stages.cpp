@@ -83,14 +83,14 @@ void map_depth(State& state, const Bench& bench) {
 void find_normals(State& state, const Bench& bench) {
   DepthMap map = bench.map;
   for (auto _ : state) estimate_normals(map, static_cast<int>(state.range(0)));
-  count(state, "pixels", map.points.size());
+  count(state, "pixels", map.pixels.size());
 }
 
 void find_outlines(State& state, const Bench& bench) {
   DepthMap map = bench.map;
   const float step = 0.03F * static_cast<float>(bench.model.diameter);
   for (auto _ : state) find_contours(map, step, Unmeasured::kUnknown);
-  count(state, "pixels", map.points.size());
+  count(state, "pixels", map.pixels.size());
 }
 
 void vote_by_surface(State& state, const Bench& bench) {

@@ -60,7 +60,7 @@ void scatter_contours(DepthMap& map) {
            {std::cos(angle), std::sin(angle), 0}});
     }
   }
-  map.background.assign(map.points.size(), 0);
+  map.background.assign(map.pixels.size(), 0);
 }
 
 TEST(ContourVotes, ComeFromThePairsThatALoopOverAllFinds) {
@@ -88,7 +88,7 @@ TEST(ContourVotes, AreNoneWithoutContours) {
 
 TEST(ContourVotes, AreNoneOnTheBackground) {
   Scene scene;
-  scene.map.background.assign(scene.map.points.size(), 1);
+  scene.map.background.assign(scene.map.pixels.size(), 1);
   EXPECT_TRUE(contour_votes(scene.map, scene.model, {}).votes.empty());
 }
 

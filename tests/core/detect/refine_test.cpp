@@ -69,7 +69,7 @@ TEST(Refine, HoldsAFlatPartByItsRim) {
   const Pose start = scan.disturbed(0, Vector3d::UnitZ(), {0.04, 0.03, 0});
   EXPECT_LT(scan.error(scan.refined(start)).metres, 0.015 * scan.model.diameter);
   scan.map.contours.clear();
-  scan.map.contour_at.assign(scan.map.points.size(), -1);
+  scan.map.contour_at.assign(scan.map.pixels.size(), -1);
   EXPECT_GT(scan.error(scan.refined(start)).metres, 0.035 * scan.model.diameter) << "without contours it stays away";
 }
 

@@ -18,7 +18,7 @@ DepthMap holey_map() {
   for (int v = 0; v < map.height; ++v) {
     for (int u = 0; u < map.width; ++u) {
       if (u % 9 == 0) map.background[v * map.width + u] = 1;
-      if (u > 40 && u < 60 && v > 30 && v < 50) map.normals[v * map.width + u].setZero();
+      if (u > 40 && u < 60 && v > 30 && v < 50) map.pixels[v * map.width + u].normal.setZero();
     }
   }
   return map;
@@ -47,8 +47,8 @@ TEST(DownSample, KeepsPerBlockTheUsablePixelNearestItsMiddle) {
       if (scene.of_block[b] < 0) continue;
       const SurfacePoint& point = scene.points[scene.of_block[b]];
       const int pixel = map.pixel_of(point.position);
-      EXPECT_EQ(point.position, map.points[pixel]);
-      EXPECT_EQ(point.normal, map.normals[pixel]);
+      EXPECT_EQ(point.position, map.pixels[pixel].position);
+      EXPECT_EQ(point.normal, map.pixels[pixel].normal);
       EXPECT_EQ(offset(pixel % map.width, pixel / map.width), least[b]);
     }
   }

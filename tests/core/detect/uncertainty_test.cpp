@@ -44,7 +44,7 @@ TEST(Uncertainty, APlateIsHeldByItsRimAndSlidesWithoutIt) {
   Scan scan(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {0, 0, 0.494}));
   EXPECT_TRUE(scan.uncertainty().free_directions.empty());
   scan.map.contours.clear();
-  scan.map.contour_at.assign(scan.map.points.size(), -1);
+  scan.map.contour_at.assign(scan.map.pixels.size(), -1);
   const Uncertainty found = scan.uncertainty();
   EXPECT_EQ(found.free_directions.size(), 3u) << "two ways to slide, one to turn";
   for (const Twist& motion : found.free_directions) {

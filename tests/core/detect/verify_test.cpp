@@ -61,11 +61,11 @@ Evidence surface_evidence_by_loop(const Scan& scan, const Eigen::Isometry3f& T, 
     total += facing;
     const int pixel = scan.map.pixel_of(p);
     if (pixel < 0 || !scan.map.measured(pixel)) continue;
-    const float distance = std::abs(normal.dot(scan.map.points[pixel] - p));
-    const float step = scan.map.points[pixel].z() - p.z();
+    const float distance = std::abs(normal.dot(scan.map.pixels[pixel].position - p));
+    const float step = scan.map.pixels[pixel].position.z() - p.z();
     if (distance <= options.tolerance && std::abs(step) < 3 * slack) {
       const bool same = !scan.map.background[pixel] && scan.map.has_normal(pixel) &&
-                        normal.dot(scan.map.normals[pixel]) >= options.normal_cosine;
+                        normal.dot(scan.map.pixels[pixel].normal) >= options.normal_cosine;
       (same ? sum.explained : sum.unexplained) += facing;
     } else {
       (step > slack ? sum.violated : step < -slack ? sum.occluded : sum.unexplained) += facing;
@@ -99,7 +99,7 @@ float depth_behind_by_hand(const DepthMap& map, const ContourPoint& contour, con
   const int pixel = map.pixel_of(p + distance * outward);
   if (pixel < 0 || !map.measured(pixel)) return NAN;
   const float slope = std::clamp(normal.dot(outward) / std::max(-normal.z(), 0.05F), -steepest, steepest);
-  return (map.points[pixel].z() - p.z() - slope * distance) / std::sqrt(1 + slope * slope);
+  return (map.pixels[pixel].position.z() - p.z() - slope * distance) / std::sqrt(1 + slope * slope);
 }
 
 /// Outline points confirmed and contradicted, one point after the other: there up to a pixel inside, gone two outside.
@@ -208,7 +208,7 @@ TEST(Verify, DoesNotFallForAFlatFacePosedInsideALargerOne) {
 
 TEST(Verify, LeavesOwnedPixelsUnexplained) {
   const Scan scan(testing::l_block(), kTilted);
-  const std::vector<int> all(scan.map.points.size(), 0), none(scan.map.points.size(), -1);
+  const std::vector<int> all(scan.map.pixels.size(), 0), none(scan.map.pixels.size(), -1);
   const Eigen::Isometry3f T = testing::in_view(scan.map, kTilted);
   EXPECT_EQ(verify(scan.map, scan.model, T, scan.options(), &all).explained, 0);
   EXPECT_EQ(verify(scan.map, scan.model, T, scan.options(), &none).explained, scan.evidence(kTilted).explained);
@@ -216,7 +216,7 @@ TEST(Verify, LeavesOwnedPixelsUnexplained) {
 
 TEST(Verify, ExplainsNothingByTheBackground) {
   Scan scan(testing::l_block(), kTilted);
-  scan.map.background.assign(scan.map.points.size(), 1);
+  scan.map.background.assign(scan.map.pixels.size(), 1);
   EXPECT_EQ(scan.evidence(kTilted).explained, 0);
 }
 
@@ -247,7 +247,7 @@ TEST(AlignmentScore, IsOneLessTheMeanDistanceOverTheCutoff) {
   double sum = 0;
   for (std::size_t i = 0; i < 500; ++i) {
     const Eigen::Vector3f p = testing::in_view(scan.map, kLying) * scan.model.surface[i].position;
-    sum += std::min(cutoff, (scan.map.points[scan.map.pixel_of(p)] - p).norm()) / cutoff;
+    sum += std::min(cutoff, (scan.map.pixels[scan.map.pixel_of(p)].position - p).norm()) / cutoff;
   }
   EXPECT_NEAR(score(kLying), 1 - sum / 500, 1e-4);
   EXPECT_NEAR(score(scan.moved({0, 0, -0.9})), 0, 1e-4F);

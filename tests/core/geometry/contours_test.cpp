@@ -64,10 +64,10 @@ TEST(Contours, AreNotWhereTheStepIsTooLow) { EXPECT_TRUE(block(0.453, Unmeasured
 TEST(Contours, AreFoundByTheirPixel) {
   const DepthMap map = block(0.47, Unmeasured::kUnknown);
   std::size_t count = 0;
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (map.contour_at[i] < 0) continue;
     ++count;
-    EXPECT_EQ(map.contours[map.contour_at[i]].position, map.points[i]);
+    EXPECT_EQ(map.contours[map.contour_at[i]].position, map.pixels[i].position);
   }
   EXPECT_EQ(count, map.contours.size());
 }
@@ -81,8 +81,8 @@ std::vector<ContourPoint> slow_contours(const DepthMap& map, float step, Unmeasu
       if (column < 0 || row < 0 || column >= map.width || row >= map.height) break;
       const int to = row * map.width + column;
       if (!map.measured(to)) continue;
-      const Vector3f way = map.points[to] - map.points[from];
-      return map.normals[from].dot(way) < -step && way.z() > 0;
+      const Vector3f way = map.pixels[to].position - map.pixels[from].position;
+      return map.pixels[from].normal.dot(way) < -step && way.z() > 0;
     }
     return unmeasured == Unmeasured::kFar;
   };
@@ -101,7 +101,7 @@ std::vector<ContourPoint> slow_contours(const DepthMap& map, float step, Unmeasu
       }
       if (outward.squaredNorm() < 0.5F) continue;
       const int i = v * map.width + u;
-      contours.push_back({map.points[i], map.normals[i], outward.normalized()});
+      contours.push_back({map.pixels[i].position, map.pixels[i].normal, outward.normalized()});
     }
   }
   return contours;
@@ -112,9 +112,10 @@ TEST(Contours, AreThoseOfTheRuleAppliedToEachPixelOfARaggedScan) {
     DepthMap map = block(0.47, unmeasured);
     scenes::Random random(5);
     for (int k = 0; k < 4000; ++k) {  // holes, and points out of place by about the step
-      const auto i = static_cast<std::size_t>(random.uniform(0, static_cast<double>(map.points.size()) - 1));
-      map.points[i].z() = k % 2 == 0 ? 0 : map.points[i].z() + static_cast<float>(random.uniform(-2, 2)) * kStep;
-      if (k % 2 == 0) map.normals[i].setZero();
+      const auto i = static_cast<std::size_t>(random.uniform(0, static_cast<double>(map.pixels.size()) - 1));
+      map.pixels[i].position.z() =
+          k % 2 == 0 ? 0 : map.pixels[i].position.z() + static_cast<float>(random.uniform(-2, 2)) * kStep;
+      if (k % 2 == 0) map.pixels[i].normal.setZero();
     }
     find_contours(map, kStep, unmeasured);
     const std::vector<ContourPoint> slow = slow_contours(map, kStep, unmeasured);

@@ -101,7 +101,7 @@ TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
 TEST(DepthMap, HoldsTheNearestPointOfEachPixel) {
   const SensorView view = *sensor_view(block_over_floor());
   const DepthMap map = depth_map(view, 0.004);  // several points a pixel
-  std::vector<float> nearest(map.points.size(), 0);
+  std::vector<float> nearest(map.pixels.size(), 0);
   for (const Vector3f& p : view.points) {
     const int u = static_cast<int>(std::floor(map.focal * p.x() / p.z() + map.cx + 0.5F));
     const int v = static_cast<int>(std::floor(map.focal * p.y() / p.z() + map.cy + 0.5F));
@@ -109,7 +109,7 @@ TEST(DepthMap, HoldsTheNearestPointOfEachPixel) {
     float& z = nearest[static_cast<std::size_t>(v) * map.width + u];
     z = z == 0 ? p.z() : std::min(z, p.z());
   }
-  for (std::size_t i = 0; i < nearest.size(); ++i) ASSERT_EQ(map.points[i].z(), nearest[i]) << i;
+  for (std::size_t i = 0; i < nearest.size(); ++i) ASSERT_EQ(map.pixels[i].position.z(), nearest[i]) << i;
 }
 
 /// A wall at 1 m with a point each 4 mm but the middle one; from `step_column` on it lies `step` deeper.
@@ -126,17 +126,21 @@ DepthMap wall_with_a_hole(int step_column, float step) {
   return depth_map(*sensor_view(unordered(points)), 0.004);
 }
 
-TEST(DepthMap, FillsASinglePixelBetweenNeighboursOfOneSurface) {
-  const DepthMap whole = wall_with_a_hole(100, 0);
-  EXPECT_EQ(std::count_if(whole.points.begin(), whole.points.end(), [](const Vector3f& p) { return p.z() > 0; }), 441);
-  for (const Vector3f& p : whole.points) EXPECT_TRUE(p.z() == 0 || std::abs(p.z() - 1) < 1e-3F);
+int measured_count(const DepthMap& map) {
+  int count = 0;
+  for (int i = 0; i < map.width * map.height; ++i) count += map.measured(i) ? 1 : 0;
+  return count;
 }
 
-TEST(DepthMap, LeavesAPixelEmptyAtADepthStep) {
-  const DepthMap stepped = wall_with_a_hole(1, 0.1F);
-  EXPECT_EQ(std::count_if(stepped.points.begin(), stepped.points.end(), [](const Vector3f& p) { return p.z() > 0; }),
-            440);
+TEST(DepthMap, FillsASinglePixelBetweenNeighboursOfOneSurface) {
+  const DepthMap whole = wall_with_a_hole(100, 0);
+  EXPECT_EQ(measured_count(whole), 441);
+  for (const SurfacePoint& pixel : whole.pixels) {
+    EXPECT_TRUE(pixel.position.z() == 0 || std::abs(pixel.position.z() - 1) < 1e-3F);
+  }
 }
+
+TEST(DepthMap, LeavesAPixelEmptyAtADepthStep) { EXPECT_EQ(measured_count(wall_with_a_hole(1, 0.1F)), 440); }
 
 TEST(DepthMap, HasPixelsOfTheWantedSize) {
   const SensorView view = *sensor_view(block_over_floor());
@@ -150,8 +154,8 @@ TEST(DepthMap, OfPointsFarApartStaysSmall) {
     const SensorView view = *sensor_view(unordered(
         {{0, 0, 1e-3F}, {2e-3F, 0, 1e-3F}, {0, 2e-3F, 1e-3F}, {reach, 0, reach}, {0, reach, reach}, {0, 0, reach}}));
     const DepthMap map = depth_map(view, 0.001);
-    EXPECT_LE(map.points.size(), 4'500'000u) << reach;
-    EXPECT_EQ(map.points.size(), static_cast<std::size_t>(map.width) * map.height);
+    EXPECT_LE(map.pixels.size(), 4'500'000u) << reach;
+    EXPECT_EQ(map.pixels.size(), static_cast<std::size_t>(map.width) * map.height);
   }
 }
 
@@ -160,7 +164,7 @@ TEST(DepthMap, KeepsGivenNormalsTurnedToTheSensorAndDropsSpoiltOnes) {
   cloud.normals = {{0, 0, -1}, {0, 0, 2}, {kNan, 0, 1}};
   const SensorView view = *sensor_view(cloud);
   const DepthMap map = depth_map(view, 0.05);
-  const auto normal_at = [&](int i) { return map.normals[map.pixel_of(view.points[i])]; };
+  const auto normal_at = [&](int i) { return map.pixels[map.pixel_of(view.points[i])].normal; };
   EXPECT_TRUE(normal_at(0).isApprox(Vector3f(0, 0, -1), 1e-5F));
   EXPECT_TRUE(normal_at(1).isApprox(Vector3f(0, 0, -1), 1e-5F));
   EXPECT_EQ(normal_at(2), Vector3f::Zero());

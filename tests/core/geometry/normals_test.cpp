@@ -47,10 +47,10 @@ TEST(Normals, OfATiltedPlaneAreExact) {
     const Vector3f expected = map.T_scene_view.linear().transpose().cast<float>() *
                               slab.T_scene_mesh.linear().cast<float>() * Vector3f(0, 0, -1);
     int count = 0;
-    for (std::size_t i = 0; i < map.points.size(); ++i) {
+    for (std::size_t i = 0; i < map.pixels.size(); ++i) {
       if (!map.has_normal(static_cast<int>(i))) continue;
       ++count;
-      ASSERT_LT(angle_degrees(map.normals[i], expected), 0.3) << "tilt " << tilt;
+      ASSERT_LT(angle_degrees(map.pixels[i].normal, expected), 0.3) << "tilt " << tilt;
     }
     EXPECT_GT(count, 0.6 * 120 * 90) << "tilt " << tilt;
   }
@@ -61,13 +61,13 @@ TEST(Normals, OfASpherePointFromItsCentre) {
   const DepthMap map = map_of({&ball, 1}, std::nullopt);
   const Vector3f centre = (map.T_scene_view.inverse() * Eigen::Vector3d(0, 0, 0.5)).cast<float>();
   int count = 0;
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (!map.has_normal(static_cast<int>(i))) continue;
-    const Vector3f radial = (map.points[i] - centre).normalized();
+    const Vector3f radial = (map.pixels[i].position - centre).normalized();
     // Facets are 7.5 degrees wide; near the side, where the window is cut off, the fit leans inwards.
     if (radial.z() > -0.5F) continue;
     ++count;
-    EXPECT_LT(angle_degrees(map.normals[i], radial), 6);
+    EXPECT_LT(angle_degrees(map.pixels[i].normal, radial), 6);
   }
   EXPECT_GT(count, 1000);
 }
@@ -75,10 +75,10 @@ TEST(Normals, OfASpherePointFromItsCentre) {
 /// Normal of the plane of least squares through the window's points, if they are many and nearby.
 Vector3f pca_normal(const DepthMap& map, int u, int v) {
   std::vector<Vector3f> window;
-  const Vector3f centre = map.points[v * map.width + u];
+  const Vector3f centre = map.pixels[v * map.width + u].position;
   for (int row = v - 1; row <= v + 1; ++row) {
     for (int column = u - 1; column <= u + 1; ++column) {
-      const Vector3f& p = map.points[row * map.width + column];
+      const Vector3f& p = map.pixels[row * map.width + column].position;
       if (p.z() > 0 && std::abs(p.z() - centre.z()) < 2 * static_cast<float>(kPixel)) window.push_back(p);
     }
   }
@@ -103,7 +103,7 @@ TEST(Normals, AgreeWithPrincipalAxesOnNoisySurfaces) {
   for (int v = 1; v + 1 < map.height; ++v) {
     for (int u = 1; u + 1 < map.width; ++u) {
       const Vector3f expected = pca_normal(map, u, v);
-      const Vector3f& normal = map.normals[v * map.width + u];
+      const Vector3f& normal = map.pixels[v * map.width + u].normal;
       if (expected.isZero() || expected.z() > -0.7F || normal.isZero()) continue;
       ++compared;
       sum += angle_degrees(normal, expected);
@@ -118,9 +118,9 @@ TEST(Normals, AgreeWithPrincipalAxesOnNoisySurfaces) {
 TEST(Normals, DoNotMixTheTwoSidesOfADepthStep) {
   const testing::PlacedMesh block = placed(testing::box({0.08F, 0.08F, 0.05F}), {0, 0, 0.47});
   const DepthMap map = map_of({&block, 1}, 0.495);
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (!map.has_normal(static_cast<int>(i))) continue;
-    const Vector3f normal = map.T_scene_view.linear().cast<float>() * map.normals[i];
+    const Vector3f normal = map.T_scene_view.linear().cast<float>() * map.pixels[i].normal;
     EXPECT_LT(angle_degrees(normal, {0, 0, -1}), 0.5);
   }
 }
@@ -128,9 +128,9 @@ TEST(Normals, DoNotMixTheTwoSidesOfADepthStep) {
 TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   const testing::PlacedMesh steep = placed(testing::box({2, 2, 0.001F}), {0, 0, 0.5}, 84);
   const DepthMap map = map_of({&steep, 1}, std::nullopt);
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (map.has_normal(static_cast<int>(i))) {
-      EXPECT_GE(-map.normals[i].dot(map.points[i].normalized()), std::cos(80.1 * kDegree));
+      EXPECT_GE(-map.pixels[i].normal.dot(map.pixels[i].position.normalized()), std::cos(80.1 * kDegree));
     }
   }
   PointCloud lonely;
@@ -139,7 +139,7 @@ TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   lonely.height = 1;
   DepthMap sparse = depth_map(*sensor_view(lonely), kPixel);
   estimate_normals(sparse, 1);
-  for (const Vector3f& normal : sparse.normals) EXPECT_TRUE(normal.isZero());
+  for (const SurfacePoint& pixel : sparse.pixels) EXPECT_TRUE(pixel.normal.isZero());
 }
 
 TEST(Normals, TellTheNoiseOfTheSensor) {
@@ -165,7 +165,7 @@ TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   for (const int threads : {2, 4}) {
     DepthMap many = one;
     estimate_normals(many, 1, {.threads = threads});
-    EXPECT_EQ(many.normals, one.normals);
+    for (std::size_t i = 0; i < one.pixels.size(); ++i) ASSERT_EQ(many.pixels[i].normal, one.pixels[i].normal) << i;
   }
 }
 
