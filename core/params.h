@@ -71,8 +71,8 @@ struct DetectParams {
   // Effort.
   int cluster_limit = 1000;     ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
   int clusters_per_place = 20;  ///< of those at most so many within a neighbourhood, [1, 1000]
-  int refine_limit = 300;       ///< poses that are refined, per source, [1, 100000]
-  int refined_per_place = 8;    ///< [1, 1000]
+  int refine_limit = 200;       ///< poses that are refined, per source, [1, 100000]
+  int refined_per_place = 5;    ///< [1, 1000]
   int finalist_limit = 150;     ///< of those, poses that are refined to the end, [1, 100000]
   int finalists_per_place = 6;  ///< [1, 1000]
 

@@ -61,12 +61,15 @@ bool same_turn(const Candidate& a, const Candidate& b) {
   return a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
 }
 
-/// The best candidates of each neighbourhood, best first, without those that repeat a better one within `repeat`
-/// metres.
-std::vector<Candidate> best_of_each_place(std::vector<Candidate> candidates, const Model& model, int per_place,
-                                          int most, float repeat) {
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.evidence.score() > b.evidence.score(); });
+void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
+  std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+    return (a.evidence.*merit)() > (b.evidence.*merit)();
+  });
+}
+
+/// The first candidates of each neighbourhood, without those that repeat an earlier one within `repeat` metres.
+std::vector<Candidate> first_of_each_place(const std::vector<Candidate>& candidates, const Model& model, int per_place,
+                                           int most, float repeat) {
   const Eigen::Vector3f centre = model.centre.cast<float>();
   const float reach = kNeighbourhood * static_cast<float>(model.diameter);
   std::vector<Candidate> kept;
@@ -141,7 +144,8 @@ std::vector<Candidate> find_candidates(Votes votes, const DepthMap& map, const M
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
-  return best_of_each_place(std::move(candidates), model, params.refined_per_place, params.refine_limit, 0);
+  sort_by(&Evidence::promise, candidates);
+  return first_of_each_place(candidates, model, params.refined_per_place, params.refine_limit, 0);
 }
 
 /// Refines each candidate and judges it anew.
@@ -173,8 +177,9 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
-  candidates = best_of_each_place(std::move(candidates), model, params.finalists_per_place, params.finalist_limit,
-                                  kRepeat * diameter);
+  sort_by(&Evidence::score, candidates);
+  candidates = first_of_each_place(candidates, model, params.finalists_per_place, params.finalist_limit,
+                                   kRepeat * diameter);
   refinement.first_gate = kLastGate * diameter;
   refinement.last_gate = kFinestGate * diameter;
   refinement.iterations = kFinestIterations;
@@ -195,7 +200,8 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
     candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
   }
   stats.verified_count += candidates.size();
-  return best_of_each_place(std::move(candidates), model, 1, params.finalist_limit, 0);
+  sort_by(&Evidence::score, candidates);
+  return first_of_each_place(candidates, model, 1, params.finalist_limit, 0);
 }
 
 }  // namespace

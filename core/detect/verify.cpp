@@ -167,6 +167,13 @@ float Evidence::score() const {
   return std::clamp(surface * outline * fit * size, 0.0F, 1.0F);
 }
 
+float Evidence::promise() const {
+  constexpr float kPenalty = 0.5F, kOutlineShare = 0.5F, kUnknown = 0.05F;
+  const float surface = (explained - kPenalty * violated) / (1 - kExcuse * occluded);
+  const float confirmed = outline_confirmed + kUnknown, contradicted = outline_contradicted + kUnknown;
+  return surface + kOutlineShare * confirmed / (confirmed + contradicted);
+}
+
 float alignment_score(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float cutoff) {
   const std::size_t count = std::min<std::size_t>(kAlignedPoints, model.surface.size());
   float sum = 0;

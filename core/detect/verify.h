@@ -32,6 +32,9 @@ struct Evidence {
   /// explains, or where so little of it is seen that chance may have made it. The weights were fitted on which poses of
   /// simulated bins are right.
   float score() const;
+  /// Ranks poses that are not refined yet. So far off, most of them contradict the scene enough that their score is 0;
+  /// this goes on telling them apart.
+  float promise() const;
 };
 
 /// The paper's alignment error as a score [section IV 5]: one less the mean distance of all model points, whether the
