@@ -57,7 +57,7 @@ struct DetectStats {
 /// Hypotheses, best first, and how they came about.
 struct DetectResult {
   std::vector<PoseHypothesis> hypotheses;
-  std::vector<PoseHypothesis> rejected;  ///< scored less than min_score; as many as DetectParams::max_rejected asks for
+  std::vector<PoseHypothesis> rejected;  ///< scored too little; as many as DetectParams::max_rejected asks for
   DetectStats stats;
   std::vector<std::string> warnings;  ///< what limited the result or is odd about the cloud
 };

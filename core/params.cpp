@@ -66,6 +66,7 @@ DetectParams DetectParams::paper() {
   params.refine = false;
   params.verification = Verification::kAllPoints;
   params.min_score = 0;
+  params.presence_score = 0;
   params.start_point_share = 1;
   return params;
 }
@@ -109,18 +110,22 @@ absl::Status validate(const TrainParams& params) {
 }
 
 absl::Status validate(const DetectParams& params) {
-  return first_error({in_range("min_score", params.min_score, 0, 1),
-                      in_range("max_results", params.max_results, 1, 1000),
-                      in_range("max_rejected", params.max_rejected, 0, 1000),
-                      in_range("cluster_limit", params.cluster_limit, 1, 100000),
-                      in_range("clusters_per_place", params.clusters_per_place, 1, 1000),
-                      in_range("refine_limit", params.refine_limit, 1, 100000),
-                      in_range("refined_per_place", params.refined_per_place, 1, 1000),
-                      in_range("finalist_limit", params.finalist_limit, 1, 100000),
-                      in_range("finalists_per_place", params.finalists_per_place, 1, 1000),
-                      in_range("start_point_share", params.start_point_share, 0.001, 1),
-                      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180),
-                      validate_reference(params), validate(params.space)});
+  return first_error({
+      in_range("min_score", params.min_score, 0, 1),
+      in_range("presence_score", params.presence_score, 0, 1),
+      in_range("max_results", params.max_results, 1, 1000),
+      in_range("max_rejected", params.max_rejected, 0, 1000),
+      in_range("cluster_limit", params.cluster_limit, 1, 100000),
+      in_range("clusters_per_place", params.clusters_per_place, 1, 1000),
+      in_range("refine_limit", params.refine_limit, 1, 100000),
+      in_range("refined_per_place", params.refined_per_place, 1, 1000),
+      in_range("finalist_limit", params.finalist_limit, 1, 100000),
+      in_range("finalists_per_place", params.finalists_per_place, 1, 1000),
+      in_range("start_point_share", params.start_point_share, 0.001, 1),
+      in_range("normal_tolerance_degrees", params.normal_tolerance / kDegree, 2, 180),
+      validate_reference(params),
+      validate(params.space),
+  });
 }
 
 }  // namespace binpose

@@ -103,6 +103,7 @@ absl::StatusOr<DetectParams> to_detect_params(const v1::DetectParams& message,
   if (!base.ok()) return base.status();
   DetectParams params = *std::move(base);
   if (message.has_min_score()) params.min_score = message.min_score();
+  if (message.has_presence_score()) params.presence_score = message.presence_score();
   if (message.has_max_results()) params.max_results = saturate(message.max_results());
   if (message.has_max_rejected()) params.max_rejected = saturate(message.max_rejected());
   if (message.has_start_point_share()) params.start_point_share = message.start_point_share();

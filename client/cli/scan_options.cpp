@@ -35,6 +35,8 @@ void add_search_options(CLI::App& command, ScanOptions& options) {
   command.add_option("--camera", options.camera, "Camera file of depth images, JSON")->type_name("FILE");
   command.add_option("--max-results", options.max_results, "At most this many poses, best first");
   command.add_option("--min-score", options.min_score, "Leave out poses that score less, 0 to 1");
+  command.add_option("--presence-score", options.presence_score,
+                     "Answer none of a part of which the best pose scores less, 0 to 1");
   command.add_option("--max-rejected", options.max_rejected,
                      "Answer so many of those apart, in `rejected` of --json; --view asks for some by itself");
   command.add_option("--start-point-share", options.start_point_share,
@@ -75,6 +77,7 @@ absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const
   if (options.max_results.has_value()) params.set_max_results(*options.max_results);
   if (options.max_rejected.has_value()) params.set_max_rejected(*options.max_rejected);
   if (options.min_score.has_value()) params.set_min_score(*options.min_score);
+  if (options.presence_score.has_value()) params.set_presence_score(*options.presence_score);
   if (options.start_point_share.has_value()) params.set_start_point_share(*options.start_point_share);
   if (options.normal_tolerance_degrees.has_value()) {
     params.set_normal_tolerance_degrees(*options.normal_tolerance_degrees);

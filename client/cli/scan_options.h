@@ -20,6 +20,7 @@ struct ScanOptions {
   std::optional<std::uint32_t> max_results;
   std::optional<std::uint32_t> max_rejected;
   std::optional<double> min_score;
+  std::optional<double> presence_score;
   std::optional<double> start_point_share;
   std::optional<double> normal_tolerance_degrees;
   bool keep_support_plane = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "absl/strings/str_format.h"
 #include "core/detect/background.h"
 #include "core/detect/describe.h"
 #include "core/detect/rank.h"
@@ -49,12 +50,18 @@ DepthMap prepare(const SensorView& view, const Model& model, const DetectParams&
 }
 
 /// One sentence for an empty result: how far the search came.
-std::string why_nothing_was_found(const DetectStats& stats) {
+std::string why_nothing_was_found(const DetectStats& stats, float best_doubtful, const DetectParams& params) {
   if (stats.stop_reason == StopReason::kDeadline) return "The time ran out before a pose was verified.";
   if (stats.start_point_count == 0) {
     return "No surface was found to start from: the cloud is too sparse for the part, or all of it is support plane.";
   }
   if (stats.vote_count == 0) return "Nothing in the cloud resembles the part: check the unit and the model.";
+  if (best_doubtful > 0) {
+    return absl::StrFormat(
+        "The best pose scores %.2f, less than presence_score (%.2f): the part is not there, or all that shows of it is "
+        "too little to be sure.",
+        best_doubtful, params.presence_score);
+  }
   return "No pose reached min_score: the part is not there, or less of it is visible than the score asks for.";
 }
 
@@ -93,15 +100,17 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     });
     return described;
   };
+  float best_doubtful = 0;
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    const RankOptions options = {verification, params.min_score, params.max_rejected,
+    const RankOptions options = {verification, params.min_score, params.presence_score, params.max_rejected,
                                  [&](int m, const Eigen::Isometry3f& T_view_model) {
                                    return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
                                  }};
     Ranking ranking = rank(finest, models, std::move(candidates), options, control);
     if (control.stop.stop_requested()) return control.status();
     candidates = std::move(ranking.accepted);
+    best_doubtful = ranking.best_doubtful;
     result.rejected = describe_all(ranking.rejected);
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
@@ -113,7 +122,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     std::erase_if(candidate.occluded_by, [&](int i) { return i >= params.max_results; });
   }
   result.hypotheses = describe_all(candidates);
-  if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats));
+  if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats, best_doubtful, params));
   stats.total_seconds = seconds_since(start);
   return result;
 }

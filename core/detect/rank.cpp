@@ -64,6 +64,7 @@ class Line {
         candidates_(std::move(candidates)),
         variants_(candidates_.size()),
         order_(candidates_.size()),
+        is_present_(models.size(), false),
         owner_(map.pixels.size(), kNobody) {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
@@ -71,18 +72,33 @@ class Line {
     choose_variants();
   }
 
-  /// The next that score at least `min_score`, at most `limit` of them.
-  std::vector<Candidate> accept(double min_score, std::size_t limit) {
+  /// The next that score at least `min_score`, at most `limit` of them. Those of a model that none of was accepted yet,
+  /// and that score less than `presence_score`, are passed over.
+  std::vector<Candidate> accept(double min_score, double presence_score, std::size_t limit) {
     std::vector<Candidate> accepted;
     while (next_ < order_.size() && accepted.size() < limit && candidates_[order_[next_]].score() >= min_score &&
            !control_.stop.stop_requested()) {
       if (!stands_firm()) continue;
-      const Candidate& candidate = candidates_[order_[next_++]];
+      const Candidate& candidate = candidates_[order_[next_]];
+      if (!is_present_[candidate.model_index] && candidate.score() < presence_score) {
+        doubtful_.push_back(order_[next_++]);
+        continue;
+      }
+      is_present_[candidate.model_index] = true;
+      ++next_;
       own_pixels(map_, *models_[candidate.model_index], candidate,
                  options_.verification[candidate.model_index].tolerance, accepted_count_++, owner_);
       accepted.push_back(candidate);
     }
     return accepted;
+  }
+
+  /// Brings those that were passed over back to the front. Returns the best one's score, 0 if there are none.
+  float take_back_doubtful() {
+    const float best = doubtful_.empty() ? 0 : candidates_[doubtful_.front()].score();
+    order_.insert(order_.begin() + static_cast<std::ptrdiff_t>(next_), doubtful_.begin(), doubtful_.end());
+    doubtful_.clear();
+    return best;
   }
 
   /// Per pixel: the running number of the accepted pose that explains it.
@@ -134,6 +150,8 @@ class Line {
   std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen ahead
   std::vector<int> order_;                              // of the candidates
   std::size_t next_ = 0;
+  std::vector<int> doubtful_;     // passed over, best first
+  std::vector<bool> is_present_;  // per model: one was accepted
   int accepted_count_ = 0;
   std::vector<int> owner_;
 };
@@ -144,13 +162,14 @@ Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vec
              const RankOptions& options, const RunControl& control) {
   Line line(map, models, std::move(candidates), options, control);
   Ranking ranking;
-  ranking.accepted = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
+  ranking.accepted = line.accept(options.min_score, options.presence_score, std::numeric_limits<std::size_t>::max());
   parallel_for(static_cast<int>(ranking.accepted.size()), control.threads, [&](int i) {
     Candidate& candidate = ranking.accepted[i];
     candidate.occluded_by = find_occluders(map, *models[candidate.model_index], candidate, i, line.owner());
   });
+  ranking.best_doubtful = line.take_back_doubtful();
   constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
-  ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(options.max_rejected));
+  ranking.rejected = line.accept(kAnything, 0, static_cast<std::size_t>(options.max_rejected));
   return ranking;
 }
 

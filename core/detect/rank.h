@@ -31,12 +31,14 @@ struct Candidate {
 struct Ranking {
   std::vector<Candidate> accepted;  ///< those that score enough
   std::vector<Candidate> rejected;  ///< the best of the others, without `occluded_by`
+  float best_doubtful = 0;          ///< best score of those that only the presence score kept out; 0 = none
 };
 
 /// How candidates are ranked.
 struct RankOptions {
   std::span<const VerifyOptions> verification = {};  ///< the final one of each model's candidates, by model index
-  double min_score = 0;  ///< candidates that score less, at first or for want of free pixels, are not accepted
+  double min_score = 0;       ///< candidates that score less, at first or for want of free pixels, are not accepted
+  double presence_score = 0;  ///< nor are those of a model of which no better one was, if they score less than this
   int max_rejected = 0;  ///< of those, so many are ranked on among themselves; what is accepted does not depend on it
   /// Whether a nearly alike pose of a candidate may be.
   std::function<bool(int model_index, const Eigen::Isometry3f& T_view_model)> allowed = [](int, const auto&) {

@@ -15,8 +15,9 @@ constexpr float kMisfitPenalty = 0.75F;
 constexpr float kLargeArea = 0.75F;
 constexpr float kSizeExponent = 0.45F;
 constexpr float kOutlinePenalty = 1.3F;
-/// What the sampling of the model leaves as residual even without noise, diameters.
-constexpr float kRelativeFloor = 0.0012F;
+/// Residual that is no misfit however little the noise, diameters: what the model's sampling leaves, and what a real
+/// scanner's calibration bends, which no window of neighbouring pixels shows as noise.
+constexpr float kRelativeFloor = 0.002F;
 /// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
 /// may all be hidden.
 constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;

@@ -164,8 +164,9 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   std::string effort = "balanced";
   const CLI::Validator efforts = CLI::IsMember({"fast", "balanced", "thorough"});
   app.add_option("--effort", effort, "the base that the other options change")->check(efforts);
-  std::optional<double> min_score, share;
+  std::optional<double> min_score, presence_score, share;
   app.add_option("--min-score", min_score);
+  app.add_option("--presence-score", presence_score);
   app.add_option("--pairs", train_params.pairs_per_point);
   app.add_option("--share", share);
   std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
@@ -191,6 +192,7 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   if (effort == "fast") detect_params = DetectParams::fast();
   if (effort == "thorough") detect_params = DetectParams::thorough();
   if (min_score) detect_params.min_score = *min_score;
+  if (presence_score) detect_params.presence_score = *presence_score;
   if (share) detect_params.start_point_share = *share;
   if (cluster_limit) detect_params.cluster_limit = *cluster_limit;
 

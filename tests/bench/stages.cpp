@@ -140,7 +140,8 @@ void verify_candidates(State& state, const Bench& bench) {
 void rank_candidates(State& state, const Bench& bench) {
   const Model* const models[] = {&bench.model};
   const VerifyOptions verification[] = {final_verification(bench.map, bench.model)};
-  const RankOptions options = {.verification = verification, .min_score = bench.params.min_score};
+  const RankOptions options = {
+      .verification = verification, .min_score = bench.params.min_score, .presence_score = bench.params.presence_score};
   for (auto _ : state) benchmark::DoNotOptimize(rank(bench.map, models, bench.candidates, options));
   count(state, "poses", bench.candidates.size());
 }

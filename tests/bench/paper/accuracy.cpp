@@ -75,7 +75,7 @@ void run_accuracy(const std::filesystem::path& parts, int count, const std::file
   const testing::ScenePart part = testing::read_parts(parts).front();
   const Model paper = train_model(part, TrainParams::paper());
   DetectParams any_score;  // the best pose counts, however sure the method is
-  any_score.min_score = 0;
+  any_score.min_score = any_score.presence_score = 0;
   const NamedFinders finders = {{"unrefined", finder(paper, paper_detection(false))},
                                 {"integration", finder(paper, paper_detection(true))},
                                 {"binpose", finder(train_model(part, {}), any_score)}};

@@ -33,7 +33,7 @@ struct Scene {
   }
   Ranking rank_all(std::vector<Candidate> candidates, double min_score, int max_rejected) const {
     const Model* models[] = {&model};
-    return rank(map, models, std::move(candidates), {options, min_score, max_rejected});
+    return rank(map, models, std::move(candidates), {options, min_score, 0, max_rejected});
   }
   std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
     return rank_all(std::move(candidates), min_score, 0).accepted;
@@ -100,6 +100,38 @@ TEST(Rank, KeepsApartTheBestOfThoseThatScoreTooLittle) {
   for (const Candidate& rejected : ranking.rejected) EXPECT_GT(rejected.score(), 0);
   EXPECT_EQ(scene.rank_all({fair, good, fair}, min_score, 1).rejected.size(), 1u);
   EXPECT_TRUE(scene.rank_all({fair, good, fair}, min_score, 0).rejected.empty());
+}
+
+TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
+  const Scene scene = blocks();
+  const Candidate sure = scene.candidate(scene.poses[0]), doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
+  ASSERT_LT(doubtful.score(), sure.score());
+  const double between = (sure.score() + doubtful.score()) / 2;
+  const Model* models[] = {&scene.model};
+  const auto rank_with = [&](const std::vector<Candidate>& candidates, double presence_score) {
+    return rank(scene.map, models, candidates, {scene.options, 0.1, presence_score, 5});
+  };
+  EXPECT_EQ(rank_with({doubtful, sure}, between).accepted.size(), 2U);
+  EXPECT_EQ(rank_with({doubtful, sure}, between).best_doubtful, 0);
+  const Ranking alone = rank_with({doubtful}, between);
+  EXPECT_TRUE(alone.accepted.empty());
+  EXPECT_EQ(alone.best_doubtful, doubtful.score());
+  ASSERT_EQ(alone.rejected.size(), 1U);
+  EXPECT_EQ(alone.rejected[0].score(), doubtful.score());
+  EXPECT_EQ(rank_with({doubtful}, 0).accepted.size(), 1U);
+}
+
+TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
+  const Scene scene = blocks();
+  const Candidate sure = scene.candidate(scene.poses[0]);
+  Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
+  doubtful.model_index = 1;
+  const VerifyOptions options[] = {scene.options[0], scene.options[0]};
+  const Model* models[] = {&scene.model, &scene.model};
+  const double between = (sure.score() + doubtful.score()) / 2;
+  const Ranking ranking = rank(scene.map, models, {doubtful, sure}, {options, 0.1, between, 0});
+  ASSERT_EQ(ranking.accepted.size(), 1U);
+  EXPECT_EQ(ranking.accepted[0].model_index, 0);
 }
 
 TEST(Rank, OfEqualScoresKeepsTheOrderOfTheList) {

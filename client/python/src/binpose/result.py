@@ -41,7 +41,7 @@ class Result:
     warnings: tuple
     stats: object = field(repr=False)  # binpose.v1.DetectStats
     request_id: str = ""
-    rejected: tuple = field(default=(), repr=False)  # below min_score, where DetectParams.max_rejected asked for them
+    rejected: tuple = field(default=(), repr=False)  # scored too little; where DetectParams.max_rejected asked for them
 
     @classmethod
     def of(cls, answer):
