@@ -46,6 +46,7 @@ struct Model {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();      ///< of the bounding box: the point that is voted for
   std::vector<Eigen::Vector3f> viewpoints;               ///< unit directions from the part to the viewer
   std::vector<std::vector<std::uint16_t>> visible_from;  ///< per viewpoint: the surface points seen, in their order
+  std::vector<std::vector<std::uint16_t>> telling_from;  ///< the same of the telling points
   std::vector<float>
       view_area;  ///< per viewpoint: area of the seen surface across the view, over the mean of all views
   PairTable pair_table;

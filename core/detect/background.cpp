@@ -28,8 +28,8 @@ void mark_outside(DepthMap& map, const SearchSpace& space, double diameter) {
   const double margin = plane_tolerance(map, static_cast<float>(diameter));
   for (std::size_t i = 0; i < map.pixels.size(); ++i) {
     if (!map.measured(static_cast<int>(i))) continue;
-    if (is_outside(space, map.T_scene_view * map.pixels[i].position.cast<double>(), diameter, margin))
-      map.background[i] = 1;
+    const Eigen::Vector3d p_scene = map.T_scene_view * map.pixels[i].position.cast<double>();
+    if (is_outside(space, p_scene, diameter, margin)) map.background[i] = 1;
   }
 }
 

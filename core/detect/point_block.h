@@ -65,9 +65,7 @@ struct LaneBuffer {
     y[lane] = p.y();
     z[lane] = p.z();
   }
-  [[gnu::always_inline]] LanePoints load() const {
-    return {load_lanes(x), load_lanes(y), load_lanes(z)};
-  }
+  [[gnu::always_inline]] LanePoints load() const { return {load_lanes(x), load_lanes(y), load_lanes(z)}; }
 };
 
 /// The pixels that points fall on, or -1.

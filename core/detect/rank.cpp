@@ -42,8 +42,8 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
     const Eigen::Vector3f p = candidate.T_view_model * model.surface[i].position;
     const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
     if (pixel < 0 || owner[pixel] == kNobody || owner[pixel] == index) continue;
-    if (map.pixels[pixel].position.z() < p.z() - kInFront * static_cast<float>(model.diameter))
-      ++hidden_by[owner[pixel]];
+    const bool hidden = map.pixels[pixel].position.z() < p.z() - kInFront * static_cast<float>(model.diameter);
+    if (hidden) ++hidden_by[owner[pixel]];
   }
   std::vector<int> occluders;
   for (const auto& [other, count] : hidden_by) {

@@ -29,14 +29,15 @@ ScenePoints down_sample(const DepthMap& map, int block_size) {
   scene.block_size = block_size;
   scene.columns = (map.width + block_size - 1) / block_size;
   scene.rows = (map.height + block_size - 1) / block_size;
-  scene.of_block.reserve(static_cast<std::size_t>(scene.columns) * scene.rows);
+  scene.first.reserve(static_cast<std::size_t>(scene.columns) * scene.rows + 1);
   for (int row = 0; row < scene.rows; ++row) {
     for (int column = 0; column < scene.columns; ++column) {
       const int pixel = middle_pixel(map, column * block_size, row * block_size, block_size);
-      scene.of_block.push_back(pixel < 0 ? -1 : static_cast<int>(scene.points.size()));
+      scene.first.push_back(static_cast<int>(scene.points.size()));
       if (pixel >= 0) scene.points.push_back(map.pixels[pixel]);
     }
   }
+  scene.first.push_back(static_cast<int>(scene.points.size()));
   return scene;
 }
 
@@ -44,7 +45,7 @@ std::vector<int> start_points(const ScenePoints& scene, double share) {
   std::vector<int> starts;
   for (int row = 0; row < scene.rows; ++row) {
     for (int column = 0; column < scene.columns; ++column) {
-      const int index = scene.of_block[static_cast<std::size_t>(row) * scene.columns + column];
+      const int index = scene.at_block(row * scene.columns + column);
       // A two-dimensional low-discrepancy pattern: every window of the image holds its share.
       const double phase = std::fmod(0.7548776662466927 * column + 0.5698402909980532 * row, 1.0);
       if (index >= 0 && phase < share) starts.push_back(index);

@@ -12,7 +12,10 @@ struct ScenePoints {
   std::vector<SurfacePoint> points;  ///< view frame, by block, row by row
   int block_size = 1;                ///< pixels
   int columns = 0, rows = 0;         ///< blocks
-  std::vector<int> of_block;         ///< per block: index into `points`, or -1
+  std::vector<int> first;            ///< per block, and after the last: its point, or else the next block's
+
+  /// Index of a block's point, or -1.
+  int at_block(int block) const { return first[block] < first[block + 1] ? first[block] : -1; }
 };
 
 /// Keeps per block of the image the pixel nearest its middle that has a normal and is no background.

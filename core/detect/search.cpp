@@ -178,8 +178,8 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
   sort_by(&Evidence::score, candidates);
-  candidates = first_of_each_place(candidates, model, params.finalists_per_place, params.finalist_limit,
-                                   kRepeat * diameter);
+  candidates =
+      first_of_each_place(candidates, model, params.finalists_per_place, params.finalist_limit, kRepeat * diameter);
   refinement.first_gate = kLastGate * diameter;
   refinement.last_gate = kFinestGate * diameter;
   refinement.iterations = kFinestIterations;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+
+#include "core/detect/point_block.h"
 
 namespace binpose {
 namespace {
@@ -15,24 +18,26 @@ constexpr float kPixelWeight = 0.28F;
 constexpr float kRuledOut = 0.05F;
 
 /// What the telling points say for a pose: those that the scene has less those that it contradicts, in pixels.
+BINPOSE_VECTORISED
 float telling_evidence(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
                        const VerifyOptions& options) {
-  const int viewpoint = nearest_viewpoint(model, T_view_model);
+  const std::span<const std::uint16_t> points = model.telling_from[nearest_viewpoint(model, T_view_model)];
   const float own_depth = kOwnDepth * static_cast<float>(model.diameter);
-  float sum = 0;
-  for (std::size_t i = 0; i < model.telling_points.size(); ++i) {
-    if (!sees(model.telling_visibility[i], viewpoint)) continue;
-    const Eigen::Vector3f p = T_view_model * model.telling_points[i].position;
-    const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
-    if (pixel < 0 || !map.measured(pixel)) continue;
-    const Eigen::Vector3f normal = T_view_model.linear() * model.telling_points[i].normal;
-    const float distance = normal.dot(map.pixels[pixel].position - p);
-    if (map.pixels[pixel].position.z() < p.z() - own_depth) continue;
-    const float facing = std::max(0.0F, -normal.dot(p) / p.norm());
-    sum += std::abs(distance) <= options.tolerance ? facing : -facing;
+  const Lanes zero = {};
+  Lanes sum = zero;
+  PointBlock block;
+  for (std::size_t first = 0; first < points.size(); first += kLanes) {
+    block.load(model.telling_points, points.subspan(first), T_view_model);
+    block.look_up(map);
+    const Lanes distance = dot(block.normal, block.scene_point - block.point);
+    const LaneInts judged =
+        (block.point.z > 0) & (block.scene_point.z > 0) & (block.scene_point.z >= block.point.z - own_depth);
+    const Lanes cosine = -dot(block.normal, block.point) / root(dot(block.point, block.point));
+    const Lanes facing = (judged & (cosine > 0)) ? cosine : zero;
+    sum += magnitude(distance) <= options.tolerance ? facing : -facing;
   }
   const float spacing = model.telling_spacing / map.pixel_size;
-  return sum * std::min(1.0F, spacing * spacing);
+  return sum_of(sum) * std::min(1.0F, spacing * spacing);
 }
 
 }  // namespace

@@ -45,11 +45,28 @@ struct Ring {
     points.clear();
     directions.clear();
   }
-  void add(int point, const Eigen::Vector3f& direction) {
+  void add(int point, const Eigen::Vector3f& offset, float distance) {
     points.push_back(point);
-    directions.add(direction);
+    directions.add(offset / distance);
   }
 };
+
+/// Adds points [first, last) to the rings around `centre` that they lie on.
+BINPOSE_VECTORISED
+void add_to_rings(const std::vector<SurfacePoint>& points, const Eigen::Vector3f& centre, int first, int last,
+                  const std::vector<float>& lengths, float tolerance, std::vector<Ring>& rings) {
+  for (; first < last; first += kLanes) {
+    const int count = std::min(kLanes, last - first);
+    const SurfaceLanes block([&](int i) -> const SurfacePoint& { return points[first + (i < count ? i : 0)]; });
+    const LanePoints offset = block.position - centre;
+    const Lanes distance = root(dot(offset, offset));
+    for (std::size_t r = 0; r < rings.size(); ++r) {
+      for_each_set(magnitude(distance - lengths[r]) <= tolerance, count, [&](int lane) {
+        rings[r].add(first + lane, points[first + lane].position - centre, distance[lane]);
+      });
+    }
+  }
+}
 
 /// Sets `found` to the points of a ring at a right angle to a direction.
 BINPOSE_VECTORISED
@@ -69,10 +86,14 @@ class PairMatcher {
       : scene_(scene), map_(map), model_(model), rings_(2 * model.params.pair_lengths.size()) {
     least_ =
         static_cast<std::int16_t>(std::lround(PairTable::kUnit * PairTable::kUnit * std::cos(params.normal_tolerance)));
+    double longest = 0;
     for (const PairLengths& lengths : model.params.pair_lengths) {
-      longest_ = std::max({longest_, lengths.relative_q1, lengths.relative_q2});
+      longest = std::max({longest, lengths.relative_q1, lengths.relative_q2});
+      lengths_.push_back(static_cast<float>(lengths.relative_q1 * model.diameter));
+      lengths_.push_back(static_cast<float>(lengths.relative_q2 * model.diameter));
     }
-    longest_ = (longest_ + model.params.relative_length_tolerance) * model.diameter;
+    tolerance_ = static_cast<float>(model.params.relative_length_tolerance * model.diameter);
+    longest_ = longest * model.diameter + tolerance_;
   }
 
   void match(int start, Votes& out) {
@@ -98,24 +119,11 @@ class PairMatcher {
     const int first_row = std::max(0, static_cast<int>((v - reach) / scene_.block_size));
     const int last_row = std::min(scene_.rows - 1, static_cast<int>((v + reach) / scene_.block_size));
     for (int row = first_row; row <= last_row; ++row) {
-      for (int column = first_column; column <= last_column; ++column) {
-        const int index = scene_.of_block[static_cast<std::size_t>(row) * scene_.columns + column];
-        if (index >= 0 && index != start) sort_into_rings(index, scene_.points[index].position - p);
-      }
+      const int in_row = row * scene_.columns;
+      add_to_rings(scene_.points, p, scene_.first[in_row + first_column], scene_.first[in_row + last_column + 1],
+                   lengths_, tolerance_, rings_);
     }
     for (Ring& ring : rings_) ring.directions.pad();
-  }
-
-  void sort_into_rings(int index, const Eigen::Vector3f& offset) {
-    const float distance = offset.norm();
-    if (distance > longest_) return;
-    const double tolerance = model_.params.relative_length_tolerance;
-    const double relative = distance / model_.diameter;
-    for (std::size_t scale = 0; scale < model_.params.pair_lengths.size(); ++scale) {
-      const PairLengths& lengths = model_.params.pair_lengths[scale];
-      if (std::abs(relative - lengths.relative_q1) <= tolerance) rings_[2 * scale].add(index, offset / distance);
-      if (std::abs(relative - lengths.relative_q2) <= tolerance) rings_[2 * scale + 1].add(index, offset / distance);
-    }
   }
 
   void match_pair(int scale, int p, int q1, int q2, Votes& out) {
@@ -145,8 +153,10 @@ class PairMatcher {
   const ScenePoints& scene_;
   const DepthMap& map_;
   const Model& model_;
-  std::vector<Ring> rings_;    // q1 and q2 of each scale
-  std::vector<int> partners_;  // of the Q1 at hand
+  std::vector<Ring> rings_;     // q1 and q2 of each scale
+  std::vector<int> partners_;   // of the Q1 at hand
+  std::vector<float> lengths_;  // of each ring, metres
+  float tolerance_ = 0;
   double longest_ = 0;
   std::int16_t least_ = 0;
 };

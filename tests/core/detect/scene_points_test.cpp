@@ -28,9 +28,9 @@ TEST(DownSample, KeepsPerBlockTheUsablePixelNearestItsMiddle) {
   const DepthMap map = holey_map();
   for (const int block : {1, 3, 4}) {
     const ScenePoints scene = down_sample(map, block);
-    ASSERT_EQ(scene.of_block.size(), static_cast<std::size_t>(scene.columns) * scene.rows);
+    ASSERT_EQ(scene.first.size(), static_cast<std::size_t>(scene.columns) * scene.rows + 1);
     // Distance of each block's nearest usable pixel from the middle, in half pixels.
-    std::vector<int> least(scene.of_block.size(), 1000);
+    std::vector<int> least(scene.first.size() - 1, 1000);
     const auto offset = [&](int u, int v) {
       return std::abs(2 * (u % block) + 1 - block) + std::abs(2 * (v % block) + 1 - block);
     };
@@ -43,9 +43,9 @@ TEST(DownSample, KeepsPerBlockTheUsablePixelNearestItsMiddle) {
       }
     }
     for (std::size_t b = 0; b < least.size(); ++b) {
-      ASSERT_EQ(scene.of_block[b] < 0, least[b] == 1000);
-      if (scene.of_block[b] < 0) continue;
-      const SurfacePoint& point = scene.points[scene.of_block[b]];
+      ASSERT_EQ(scene.at_block(b) < 0, least[b] == 1000);
+      if (scene.at_block(b) < 0) continue;
+      const SurfacePoint& point = scene.points[scene.at_block(b)];
       const int pixel = map.pixel_of(point.position);
       EXPECT_EQ(point.position, map.pixels[pixel].position);
       EXPECT_EQ(point.normal, map.pixels[pixel].normal);
