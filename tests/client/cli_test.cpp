@@ -189,10 +189,10 @@ TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
 }
 
 TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
-  const Output output =
-      run("detect --model gear bolt --unit mm --max-results 5 --min-score 0 --start-point-share 0.5 "
-          "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --scene",
-          {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
+  const Output output = run(
+      "detect --model gear bolt --unit mm --max-results 5 --presence-score 0.2 --min-score 0 --start-point-share 0.5 "
+      "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --scene",
+      {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
   EXPECT_EQ(server_.stream_count(), 1);
   const std::vector<v1::DetectRequest> requests = server_.detect_requests();
@@ -202,6 +202,7 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   const v1::DetectRequest& request = requests[0];
   EXPECT_THAT(request.model_ids(), ::testing::ElementsAre("gear", "bolt"));
   EXPECT_EQ(request.params().max_results(), 5u);
+  EXPECT_EQ(request.params().presence_score(), 0.2);
   EXPECT_TRUE(request.params().has_min_score());
   EXPECT_EQ(request.params().max_rejected(), 7u);
   EXPECT_EQ(request.params().start_point_share(), 0.5);

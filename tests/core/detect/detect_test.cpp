@@ -162,6 +162,20 @@ TEST(Detect, ReturnsNothingBelowTheMinimumScore) {
   for (const PoseHypothesis& h : result.hypotheses) EXPECT_GE(h.score, 0.6);
 }
 
+TEST(Detect, SaysThatNoPoseWasSureEnoughForThePartToBeThere) {
+  const Model model = testing::quick_model(testing::l_block());
+  const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
+  const double best = search(cloud, model)->hypotheses.front().score;
+  DetectParams params;
+  params.presence_score = (best + 1) / 2;
+  const DetectResult result = *search(cloud, model, params);
+  EXPECT_TRUE(result.hypotheses.empty());
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_NE(result.warnings[0].find("less than presence_score"), std::string::npos);
+  params.presence_score = best;
+  EXPECT_GE(search(cloud, model, params)->hypotheses.size(), 2U);
+}
+
 TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
   const Model model = testing::quick_model(testing::l_block());
   const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());
