@@ -4,50 +4,16 @@
 #include <chrono>
 
 #include "absl/strings/str_format.h"
-#include "core/detect/background.h"
 #include "core/detect/describe.h"
+#include "core/detect/prepare.h"
 #include "core/detect/rank.h"
 #include "core/detect/search.h"
 #include "core/detect/stage_timer.h"
-#include "core/detect/support_plane.h"
-#include "core/geometry/contours.h"
 #include "core/geometry/depth_map.h"
-#include "core/geometry/normals.h"
 #include "core/parallel.h"
 
 namespace binpose {
 namespace {
-
-constexpr double kRelativePixel = 0.014;
-constexpr double kPixelPerSpacing = 1.2;
-constexpr float kContourStep = 0.03F;
-
-/// Normals from the smallest windows that the noise allows: wide ones round off edges.
-void estimate_steady_normals(DepthMap& map, const RunControl& control) {
-  constexpr int kWidest = 3;
-  constexpr double kNormalError = 4 * kDegree;
-  estimate_normals(map, 1, control);
-  const float noise = map.noise;
-  int radius = 1;
-  while (radius < kWidest && normal_error(noise, map.pixel_size, radius) > kNormalError) ++radius;
-  if (radius == 1) return;
-  estimate_normals(map, radius, control);
-  map.noise = noise;
-}
-
-/// The depth map that suits a model, with all that its search reads.
-DepthMap prepare(const SensorView& view, const Model& model, const DetectParams& params, const RunControl& control,
-                 DetectStats& stats) {
-  const StageTimer timer(stats.preprocess_seconds);
-  DepthMap map = depth_map(view, std::max(kRelativePixel * model.diameter, kPixelPerSpacing * view.spacing), control);
-  if (view.normals.empty()) estimate_steady_normals(map, control);
-  if (control.interrupted()) return map;
-  const bool is_background_known = params.space.support_plane || params.space.bin_interior;
-  if (params.remove_support_plane && !is_background_known) mark_support_plane(map, static_cast<float>(model.diameter));
-  mark_outside(map, params.space, model.diameter);
-  find_contours(map, kContourStep * static_cast<float>(model.diameter), Unmeasured::kUnknown, control);
-  return map;
-}
 
 /// One sentence for an empty result: how far the search came.
 std::string why_nothing_was_found(const DetectStats& stats, float best_doubtful, const DetectParams& params) {
@@ -83,7 +49,11 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   std::vector<VerifyOptions> verification;
   for (std::size_t m = 0; m < models.size() && !control.stop.stop_requested(); ++m) {
     const RunControl turn = control.with_share_of_time(1.0 / static_cast<double>(models.size() - m));
-    DepthMap map = prepare(*view, *models[m], params, turn, stats);
+    DepthMap map;
+    {
+      const StageTimer timer(stats.preprocess_seconds);
+      map = prepare(*view, *models[m], params, turn);
+    }
     const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, turn, stats);
     if (turn.past_deadline()) stats.stop_reason = StopReason::kDeadline;
     candidates.insert(candidates.end(), found.begin(), found.end());

@@ -61,7 +61,7 @@ void add_to_rings(const std::vector<SurfacePoint>& points, const Eigen::Vector3f
     const LanePoints offset = block.position - centre;
     const Lanes distance = root(dot(offset, offset));
     for (std::size_t r = 0; r < rings.size(); ++r) {
-      for_each_set(magnitude(distance - lengths[r]) <= tolerance, count, [&](int lane) {
+      for_each_set((distance > 0) & (magnitude(distance - lengths[r]) <= tolerance), count, [&](int lane) {
         rings[r].add(first + lane, points[first + lane].position - centre, distance[lane]);
       });
     }

@@ -15,18 +15,13 @@
 #include "core/detect/detect.h"
 #include "core/train/train.h"
 #include "tests/support/bin_scene.h"
+#include "tests/support/median.h"
 #include "tests/support/scene_score.h"
 
 namespace {
 
 using namespace binpose;           // NOLINT
 using namespace binpose::testing;  // NOLINT
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// The same scan by a worse sensor: noise along the ray, and only a share of the points.
 void degrade(PointCloud& cloud, double noise, double share, unsigned seed) {
@@ -76,19 +71,6 @@ void add(DetectStats& sum, const DetectStats& s) {
   sum.vote_count += s.vote_count;
   sum.cluster_count += s.cluster_count;
   sum.verified_count += s.verified_count;
-}
-
-/// The scenes of a folder whose names hold `filter`, in order.
-std::vector<std::filesystem::path> scene_folders(const std::string& folder, const std::string& filter) {
-  std::vector<std::filesystem::path> found;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (std::filesystem::exists(entry.path() / "gt.json") &&
-        entry.path().filename().string().find(filter) != std::string::npos) {
-      found.push_back(entry.path());
-    }
-  }
-  std::sort(found.begin(), found.end());
-  return found;
 }
 
 using Trained = std::map<std::string, std::pair<Model, PoseJudge>>;

@@ -32,15 +32,14 @@
 #include <vector>
 
 #include "core/detect/detect.h"
+#include "core/detect/prepare.h"
 #include "core/detect/rank.h"
 #include "core/detect/refine.h"
 #include "core/detect/search.h"
 #include "core/detect/stage_timer.h"
-#include "core/detect/support_plane.h"
-#include "core/geometry/contours.h"
-#include "core/geometry/normals.h"
 #include "core/train/train.h"
 #include "tests/support/bin_scene.h"
+#include "tests/support/median.h"
 #include "tests/support/scene_score.h"
 
 namespace {
@@ -83,12 +82,6 @@ struct Row {
   std::vector<double> seconds;
 };
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Points with normals as OpenCV has them: a row of six each.
 cv::Mat to_rows(std::span<const SurfacePoint> points) {
   cv::Mat rows(static_cast<int>(points.size()), 6, CV_32F);
@@ -117,17 +110,6 @@ Answer detect_by_ours(const PointCloud& cloud, const Model& model) {
   absl::StatusOr<DetectResult> result = detect(cloud, models, {}, {});
   if (!result.ok()) throw std::runtime_error(result.status().ToString());
   return {std::move(result->hypotheses), seconds_since(start)};
-}
-
-/// The depth map as our detector makes it for a model.
-DepthMap prepare(const PointCloud& cloud, double diameter) {
-  const absl::StatusOr<SensorView> view = sensor_view(cloud);
-  if (!view.ok()) throw std::runtime_error(view.status().ToString());
-  DepthMap map = depth_map(*view, std::max(0.014 * diameter, 1.2 * view->spacing));
-  estimate_normals(map, 1);
-  mark_support_plane(map, static_cast<float>(diameter));
-  find_contours(map, 0.03F * static_cast<float>(diameter), Unmeasured::kUnknown);
-  return map;
 }
 
 /// The peer's poses of a scene, T_view_model, most votes first.
@@ -160,7 +142,9 @@ Answer detect_by_peer(const PointCloud& cloud, const TrainedPart& part, const Pe
   constexpr double kLeastScore = 0.1;  // lower than any threshold that serves
   const auto start = std::chrono::steady_clock::now();
   const Model& model = part.model;
-  const DepthMap map = prepare(cloud, model.diameter);
+  const absl::StatusOr<SensorView> view = sensor_view(cloud);
+  if (!view.ok()) throw std::runtime_error(view.status().ToString());
+  const DepthMap map = prepare(*view, model, {});
   const VerifyOptions verification = final_verification(map, model);
   std::vector<Candidate> candidates;
   for (const Eigen::Isometry3f& T_view_model : match(map, *part.peer, options)) {
@@ -249,12 +233,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);
 
-  std::vector<std::filesystem::path> folders;
-  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
-    const bool is_asked_for = entry.path().filename().string().find(filter) != std::string::npos;
-    if (is_asked_for && std::filesystem::exists(entry.path() / "gt.json")) folders.push_back(entry.path());
-  }
-  std::sort(folders.begin(), folders.end());
+  const std::vector<std::filesystem::path> folders = scene_folders(scenes_folder, filter);
   std::map<std::string, ScenePart> parts;
   for (ScenePart& part : read_parts(parts_folder)) parts.emplace(part.name, std::move(part));
   std::map<std::string, TrainedPart> trained;

@@ -1,5 +1,6 @@
 #include "tests/support/bin_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -123,6 +124,17 @@ BinScene read_scene(const fs::path& folder, bool prefer_ply) {
     scene.instances.push_back({read_pose(instance.at("pose")), instance.at("visibility")});
   }
   return scene;
+}
+
+std::vector<fs::path> scene_folders(const fs::path& folder, const std::string& filter) {
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (fs::exists(entry.path() / "gt.json") && entry.path().filename().string().find(filter) != std::string::npos) {
+      found.push_back(entry.path());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 }  // namespace binpose::testing

@@ -42,4 +42,7 @@ std::vector<ScenePart> read_parts(const std::filesystem::path& folder);
 /// `prefer_ply` is set and it exists. Throws std::runtime_error.
 BinScene read_scene(const std::filesystem::path& folder, bool prefer_ply = false);
 
+/// The scene folders in a folder whose names hold `filter`, by name.
+std::vector<std::filesystem::path> scene_folders(const std::filesystem::path& folder, const std::string& filter);
+
 }  // namespace binpose::testing
