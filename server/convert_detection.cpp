@@ -66,6 +66,7 @@ v1::PoseHypothesis to_proto(const PoseHypothesis& hypothesis, const std::string&
   message.set_explained_fraction(hypothesis.explained_fraction);
   message.set_violated_fraction(hypothesis.violated_fraction);
   message.set_unexplained_fraction(hypothesis.unexplained_fraction);
+  message.set_explained_area(hypothesis.explained_area);
   message.set_confidence(hypothesis.confidence);
   for (const Pose& variant : hypothesis.variants) *message.add_variants() = to_proto(variant, metres_per_unit);
   for (const Pose& other : hypothesis.equivalents) *message.add_equivalents() = to_proto(other, metres_per_unit);

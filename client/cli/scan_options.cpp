@@ -36,7 +36,7 @@ void add_search_options(CLI::App& command, ScanOptions& options) {
   command.add_option("--max-results", options.max_results, "At most this many poses, best first");
   command.add_option("--min-score", options.min_score, "Leave out poses that score less, 0 to 1");
   command.add_option("--presence-score", options.presence_score,
-                     "Answer none of a part of which the best pose scores less, 0 to 1");
+                     "Answer none of a part of which no pose has a score x explained area as high, 0 to 1");
   command.add_option("--max-rejected", options.max_rejected,
                      "Answer so many of those apart, in `rejected` of --json; --view asks for some by itself");
   command.add_option("--start-point-share", options.start_point_share,

@@ -197,6 +197,7 @@ function factsOf(h, unit) {
     ["position", `${position.map((v) => v.toFixed(2)).join("  ")} mm`],
     ["quaternion", [x, y, z, w].map((v) => v.toFixed(4)).join("  ")],
     ["explained", percent(h.explainedFraction)],
+    ["of an average view", percent(h.explainedArea)],
     ["seen through", percent(h.violatedFraction)],
     ["other surface", percent(h.unexplainedFraction)],
     ["residual", `${((h.residual ?? 0) * unit).toFixed(2)} mm`],

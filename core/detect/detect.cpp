@@ -24,8 +24,8 @@ std::string why_nothing_was_found(const DetectStats& stats, float best_doubtful,
   if (stats.vote_count == 0) return "Nothing in the cloud resembles the part: check the unit and the model.";
   if (best_doubtful > 0) {
     return absl::StrFormat(
-        "The best pose scores %.2f, less than presence_score (%.2f): the part is not there, or all that shows of it is "
-        "too little to be sure.",
+        "The best pose proves the part by %.2f (its score, times its explained_area below 1), less than presence_score "
+        "(%.2f): the part is not there, or all that shows of it is too little to be sure.",
         best_doubtful, params.presence_score);
   }
   return "No pose reached min_score: the part is not there, or less of it is visible than the score asks for.";

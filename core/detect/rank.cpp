@@ -61,31 +61,26 @@ class Line {
         models_(models),
         options_(options),
         control_(control),
-        candidates_(std::move(candidates)),
-        variants_(candidates_.size()),
-        order_(candidates_.size()),
-        is_present_(models.size(), false),
-        owner_(map.pixels.size(), kNobody) {
-    std::stable_sort(candidates_.begin(), candidates_.end(),
+        first_(std::move(candidates)),
+        variants_(first_.size()),
+        is_absent_(models.size(), false) {
+    std::stable_sort(first_.begin(), first_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
-    std::iota(order_.begin(), order_.end(), 0);
     choose_variants();
+    start_anew();
   }
 
-  /// The next that score at least `min_score`, at most `limit` of them. Those of a model that none of was accepted yet,
-  /// and that score less than `presence_score`, are passed over.
-  std::vector<Candidate> accept(double min_score, double presence_score, std::size_t limit) {
+  /// The next that score at least `min_score`, at most `limit` of them. Those of absent models are passed over.
+  std::vector<Candidate> accept(double min_score, std::size_t limit) {
     std::vector<Candidate> accepted;
     while (next_ < order_.size() && accepted.size() < limit && candidates_[order_[next_]].score() >= min_score &&
            !control_.stop.stop_requested()) {
-      if (!stands_firm()) continue;
-      const Candidate& candidate = candidates_[order_[next_]];
-      if (!is_present_[candidate.model_index] && candidate.score() < presence_score) {
-        doubtful_.push_back(order_[next_++]);
+      if (is_absent_[candidates_[order_[next_]].model_index]) {
+        passed_over_.push_back(order_[next_++]);
         continue;
       }
-      is_present_[candidate.model_index] = true;
-      ++next_;
+      if (!stands_firm()) continue;
+      const Candidate& candidate = candidates_[order_[next_++]];
       own_pixels(map_, *models_[candidate.model_index], candidate,
                  options_.verification[candidate.model_index].tolerance, accepted_count_++, owner_);
       accepted.push_back(candidate);
@@ -93,18 +88,33 @@ class Line {
     return accepted;
   }
 
-  /// Brings those that were passed over back to the front. Returns the best one's score, 0 if there are none.
-  float take_back_doubtful() {
-    const float best = doubtful_.empty() ? 0 : candidates_[doubtful_.front()].score();
-    order_.insert(order_.begin() + static_cast<std::ptrdiff_t>(next_), doubtful_.begin(), doubtful_.end());
-    doubtful_.clear();
-    return best;
+  /// Nothing is accepted any more, and nothing will be of these models besides those that were absent before.
+  void start_without(const std::vector<int>& absent) {
+    for (const int model : absent) is_absent_[model] = true;
+    start_anew();
+  }
+
+  /// Brings those that were passed over back to the front.
+  void take_back() {
+    order_.insert(order_.begin() + static_cast<std::ptrdiff_t>(next_), passed_over_.begin(), passed_over_.end());
+    passed_over_.clear();
+    std::fill(is_absent_.begin(), is_absent_.end(), false);
   }
 
   /// Per pixel: the running number of the accepted pose that explains it.
   const std::vector<int>& owner() const { return owner_; }
 
  private:
+  void start_anew() {
+    candidates_ = first_;
+    order_.resize(candidates_.size());
+    std::iota(order_.begin(), order_.end(), 0);
+    next_ = 0;
+    passed_over_.clear();
+    accepted_count_ = 0;
+    owner_.assign(map_.pixels.size(), kNobody);
+  }
+
   VariantChoice variant_of(const Candidate& candidate) const {
     return choose_variant(
         map_, *models_[candidate.model_index], candidate.T_view_model, options_.verification[candidate.model_index],
@@ -113,9 +123,9 @@ class Line {
 
   /// Of all that will stand first, in parallel: the choice does not depend on what others own.
   void choose_variants() {
-    parallel_for(static_cast<int>(candidates_.size()), control_.threads, [&](int i) {
-      if (candidates_[i].score() < options_.min_score || control_.stop.stop_requested()) return;
-      variants_[i] = variant_of(candidates_[i]);
+    parallel_for(static_cast<int>(first_.size()), control_.threads, [&](int i) {
+      if (first_[i].score() < options_.min_score || control_.stop.stop_requested()) return;
+      variants_[i] = variant_of(first_[i]);
     });
   }
 
@@ -126,13 +136,10 @@ class Line {
     const Model& model = *models_[candidate.model_index];
     const VerifyOptions& options = options_.verification[candidate.model_index];
     const float before = candidate.score();
-    if (!candidate.has_variant) {
-      VariantChoice choice = variants_[i] ? *std::move(variants_[i]) : variant_of(candidate);
-      candidate.has_variant = true;
-      candidate.T_view_model = choice.T_view_model;
-      candidate.confidence = choice.confidence;
-      candidate.rivals = std::move(choice.rivals);
-    }
+    if (!variants_[i]) variants_[i] = variant_of(first_[i]);
+    candidate.T_view_model = variants_[i]->T_view_model;
+    candidate.confidence = variants_[i]->confidence;
+    candidate.rivals = variants_[i]->rivals;
     candidate.evidence = verify(map_, model, candidate.T_view_model, options, &owner_);
     if (candidate.score() >= before) return true;
     const auto first = order_.begin() + static_cast<std::ptrdiff_t>(next_);
@@ -146,15 +153,43 @@ class Line {
   const std::span<const Model* const> models_;
   const RankOptions& options_;
   const RunControl& control_;
-  std::vector<Candidate> candidates_;
-  std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen ahead
+  std::vector<Candidate> first_;                        // as they came, best first
+  std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen already
+  std::vector<bool> is_absent_;                         // per model: none of it is accepted
+  std::vector<Candidate> candidates_;                   // as judged so far
   std::vector<int> order_;                              // of the candidates
   std::size_t next_ = 0;
-  std::vector<int> doubtful_;     // passed over, best first
-  std::vector<bool> is_present_;  // per model: one was accepted
+  std::vector<int> passed_over_;  // best first
   int accepted_count_ = 0;
   std::vector<int> owner_;
 };
+
+/// The best presence of each model's candidates, -1 where there are none.
+std::vector<float> presence_by_model(std::span<const Candidate> candidates, std::size_t model_count) {
+  std::vector<float> presence(model_count, -1);
+  for (const Candidate& candidate : candidates) {
+    float& best = presence[candidate.model_index];
+    best = std::max(best, candidate.presence());
+  }
+  return presence;
+}
+
+/// Accepts candidates of the models that are there. What an absent model's poses took from others is theirs again.
+std::vector<Candidate> accept_present(Line& line, std::size_t model_count, const RankOptions& options,
+                                      float& best_doubtful) {
+  while (true) {
+    std::vector<Candidate> accepted = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
+    const std::vector<float> presence = presence_by_model(accepted, model_count);
+    std::vector<int> absent;
+    for (int m = 0; m < static_cast<int>(model_count); ++m) {
+      if (presence[m] < 0 || presence[m] >= options.presence_score) continue;
+      best_doubtful = std::max(best_doubtful, presence[m]);
+      absent.push_back(m);
+    }
+    if (absent.empty()) return accepted;
+    line.start_without(absent);
+  }
+}
 
 }  // namespace
 
@@ -162,14 +197,14 @@ Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vec
              const RankOptions& options, const RunControl& control) {
   Line line(map, models, std::move(candidates), options, control);
   Ranking ranking;
-  ranking.accepted = line.accept(options.min_score, options.presence_score, std::numeric_limits<std::size_t>::max());
+  ranking.accepted = accept_present(line, models.size(), options, ranking.best_doubtful);
   parallel_for(static_cast<int>(ranking.accepted.size()), control.threads, [&](int i) {
     Candidate& candidate = ranking.accepted[i];
     candidate.occluded_by = find_occluders(map, *models[candidate.model_index], candidate, i, line.owner());
   });
-  ranking.best_doubtful = line.take_back_doubtful();
+  line.take_back();
   constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
-  ranking.rejected = line.accept(kAnything, 0, static_cast<std::size_t>(options.max_rejected));
+  ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(options.max_rejected));
   return ranking;
 }
 

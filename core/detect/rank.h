@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <span>
 #include <vector>
@@ -18,27 +19,29 @@ struct Candidate {
   Eigen::Isometry3f T_view_model = Eigen::Isometry3f::Identity();
   float votes = 0;
   Evidence evidence;
-  bool has_variant = false;               ///< the nearly alike pose that the scene speaks for was chosen; by rank()
   float confidence = 1;                   ///< that the choice is right
   std::vector<Eigen::Isometry3f> rivals;  ///< T_view_model of nearly alike poses that the scene does not rule out
   std::vector<int> occluded_by;           ///< indices into the ranked list, ascending; set by rank()
 
   /// The evidence, times the confidence that none of the nearly alike poses is the right one.
   float score() const { return evidence.score() * confidence; }
+  /// How surely the part is there: the score, less where less shows of it than of the part on average. Edges alone are
+  /// weak proof: the rim of a bin resembles many a part seen edge-on.
+  float presence() const { return score() * std::min(1.0F, evidence.area); }
 };
 
 /// Candidates without doubles, best first.
 struct Ranking {
   std::vector<Candidate> accepted;  ///< those that score enough
   std::vector<Candidate> rejected;  ///< the best of the others, without `occluded_by`
-  float best_doubtful = 0;          ///< best score of those that only the presence score kept out; 0 = none
+  float best_doubtful = 0;          ///< best presence() of the models that only the presence score kept out; 0 = none
 };
 
 /// How candidates are ranked.
 struct RankOptions {
   std::span<const VerifyOptions> verification = {};  ///< the final one of each model's candidates, by model index
   double min_score = 0;       ///< candidates that score less, at first or for want of free pixels, are not accepted
-  double presence_score = 0;  ///< nor are those of a model of which no better one was, if they score less than this
+  double presence_score = 0;  ///< nor are those of a model of which none has at least this presence()
   int max_rejected = 0;  ///< of those, so many are ranked on among themselves; what is accepted does not depend on it
   /// Whether a nearly alike pose of a candidate may be.
   std::function<bool(int model_index, const Eigen::Isometry3f& T_view_model)> allowed = [](int, const auto&) {

@@ -78,6 +78,7 @@ class PythonTest(unittest.TestCase):
         self.assertEqual(best.covariance.shape, (6, 6))
         self.assertTrue((np.linalg.eigvalsh(best.covariance) > 0).all())
         self.assertEqual(best.free_directions.shape[1], 6)
+        self.assertGreater(best.explained_area, 0.2)
         box = self.client.model("part")
         centre = [500 * (getattr(box.bounding_box_min, a) + getattr(box.bounding_box_max, a)) for a in "xyz"]  # mm
         region = service.OrientedBox()

@@ -115,10 +115,41 @@ TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
   EXPECT_EQ(rank_with({doubtful, sure}, between).best_doubtful, 0);
   const Ranking alone = rank_with({doubtful}, between);
   EXPECT_TRUE(alone.accepted.empty());
-  EXPECT_EQ(alone.best_doubtful, doubtful.score());
+  EXPECT_EQ(alone.best_doubtful, doubtful.presence());
   ASSERT_EQ(alone.rejected.size(), 1U);
   EXPECT_EQ(alone.rejected[0].score(), doubtful.score());
   EXPECT_EQ(rank_with({doubtful}, 0).accepted.size(), 1U);
+}
+
+TEST(Rank, TakesAPoseOfWhichLittleShowsForWeakProof) {
+  const Scene scene = blocks();
+  const Candidate whole = scene.candidate(scene.poses[0]);
+  Candidate edge_on = whole;
+  edge_on.evidence.area = 0.5F;
+  EXPECT_LT(edge_on.presence(), 0.6F * whole.presence());
+  EXPECT_EQ(edge_on.presence(), 0.5F * edge_on.score());
+  EXPECT_LE(whole.presence(), whole.score());
+}
+
+TEST(Rank, GivesBackWhatAnAbsentModelTook) {
+  const Scene scene = blocks();
+  Candidate first = scene.candidate(scene.poses[0]), second = scene.candidate(shifted(scene.poses[0], 0.0001));
+  // As if the one's model showed much more on average, so that this pose proves it less.
+  Model absent = scene.model, present = scene.model;
+  for (float& area : absent.view_area) area *= 0.8F / first.evidence.area;
+  for (float& area : present.view_area) area *= 1.1F / second.evidence.area;
+  second.model_index = 1;
+  const VerifyOptions options[] = {scene.options[0], scene.options[0]};
+  const Model* models[] = {&absent, &present};
+  const std::vector<Candidate> both = {first, second};
+  const double presence_score = 0.99 * second.score();
+  ASSERT_LT(0.8F * first.score(), presence_score);
+  EXPECT_EQ(rank(scene.map, models, both, {options, 0.1, 0, 0}).accepted.at(0).model_index, 0);
+  const Ranking ranking = rank(scene.map, models, both, {options, 0.1, presence_score, 0});
+  ASSERT_EQ(ranking.accepted.size(), 1U);
+  EXPECT_EQ(ranking.accepted[0].model_index, 1);
+  EXPECT_GE(ranking.accepted[0].score(), 0.99F * second.score());
+  EXPECT_GT(ranking.best_doubtful, 0);
 }
 
 TEST(Rank, AsksEachModelForASureOneOfItsOwn) {

@@ -14,6 +14,7 @@ class Part:
     score: float
     visible_fraction: float
     explained_fraction: float
+    explained_area: float  # over what the part shows on average over all views
     violated_fraction: float
     residual: float
     votes: float
@@ -27,7 +28,8 @@ class Part:
     @classmethod
     def of(cls, hypothesis):
         return cls(hypothesis.model_id, matrix_of(hypothesis.pose), hypothesis.score, hypothesis.visible_fraction,
-                   hypothesis.explained_fraction, hypothesis.violated_fraction, hypothesis.residual, hypothesis.votes,
+                   hypothesis.explained_fraction, hypothesis.explained_area, hypothesis.violated_fraction,
+                   hypothesis.residual, hypothesis.votes,
                    tuple(hypothesis.occluded_by), hypothesis.confidence, tuple(map(matrix_of, hypothesis.variants)),
                    tuple(map(matrix_of, hypothesis.equivalents)), np.array(hypothesis.covariance).reshape(-1, 6),
                    np.array([_motion_of(twist) for twist in hypothesis.free_directions]).reshape(-1, 6))
