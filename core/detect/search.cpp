@@ -1,10 +1,12 @@
 #include "core/detect/search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/detect/cluster.h"
 #include "core/detect/contour_votes.h"
+#include "core/detect/places.h"
 #include "core/detect/refine.h"
 #include "core/detect/scene_points.h"
 #include "core/detect/stage_timer.h"
@@ -17,7 +19,6 @@ namespace {
 // Lengths as shares of the diameter D.
 constexpr double kRelativeBlock = 0.042;
 constexpr float kClusterRadius = 0.06F;
-constexpr float kNeighbourhood = 0.25F;
 constexpr float kCoarseTolerance = 0.04F;
 constexpr float kFinalTolerance = 0.006F;
 constexpr float kNoiseTolerance = 2.5F;
@@ -55,40 +56,10 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
   });
 }
 
-/// Whether two poses are turned alike, but for what refinement leaves.
-bool same_turn(const Candidate& a, const Candidate& b) {
-  constexpr float kLeastTrace = 2.985F;  // 7 degrees
-  return a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
-}
-
 void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
   std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
     return (a.evidence.*merit)() > (b.evidence.*merit)();
   });
-}
-
-/// The first candidates of each neighbourhood, without those that repeat an earlier one within `repeat` metres.
-std::vector<Candidate> first_of_each_place(const std::vector<Candidate>& candidates, const Model& model, int per_place,
-                                           int most, float repeat) {
-  const Eigen::Vector3f centre = model.centre.cast<float>();
-  const float reach = kNeighbourhood * static_cast<float>(model.diameter);
-  std::vector<Candidate> kept;
-  std::vector<Eigen::Vector3f> places;
-  for (const Candidate& candidate : candidates) {
-    if (static_cast<int>(kept.size()) >= most) break;
-    const Eigen::Vector3f place = candidate.T_view_model * centre;
-    int around = 0;
-    bool repeats = false;
-    for (std::size_t i = 0; i < kept.size() && !repeats; ++i) {
-      const float sq_distance = (places[i] - place).squaredNorm();
-      around += static_cast<int>(sq_distance < reach * reach);
-      repeats = sq_distance < repeat * repeat && same_turn(candidate, kept[i]);
-    }
-    if (repeats || around >= per_place) continue;
-    kept.push_back(candidate);
-    places.push_back(place);
-  }
-  return kept;
 }
 
 Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
@@ -108,44 +79,66 @@ void keep_votes_in_regions(const DepthMap& map, const SearchSpace& space, double
   });
 }
 
-/// Clusters of votes that stand a coarse verification: where the model may be, best first.
-std::vector<Candidate> find_candidates(Votes votes, const DepthMap& map, const Model& model, int model_index,
-                                       const DetectParams& params, const RunControl& control, DetectStats& stats) {
+/// Clusters of votes whose poses are allowed, most votes first.
+std::vector<Candidate> cluster_votes(std::vector<PoseVote> votes, const DepthMap& map, const Model& model,
+                                     int model_index, const DetectParams& params, const RunControl& control) {
   const auto diameter = static_cast<float>(model.diameter);
-  stats.scene_pair_count += votes.scene_pairs;
-  stats.vote_count += votes.votes.size();
+  const Slack voted = {kClusterRadius * model.diameter, kVotedAngle};
+  keep_votes_in_regions(map, params.space, voted.distance, votes);
+  ClusterOptions options;
+  options.radius = kClusterRadius * diameter;
+  options.neighbourhood = kNeighbourhood * diameter;
+  options.most_per_neighbourhood = params.clusters_per_place;
+  options.most = params.cluster_limit;
   std::vector<Candidate> candidates;
-  {
-    const StageTimer timer(stats.cluster_seconds);
-    const Slack voted = {kClusterRadius * model.diameter, kVotedAngle};
-    keep_votes_in_regions(map, params.space, voted.distance, votes.votes);
-    ClusterOptions options;
-    options.radius = kClusterRadius * diameter;
-    options.neighbourhood = kNeighbourhood * diameter;
-    options.most_per_neighbourhood = params.clusters_per_place;
-    options.most = params.cluster_limit;
-    for (const PoseCluster& c : cluster(votes.votes, options, control)) {
-      Candidate candidate;
-      candidate.model_index = model_index;
-      candidate.T_view_model = pose_of(c, model);
-      candidate.votes = c.votes;
-      if (is_allowed(map, model, model_index, params.space, voted, candidate.T_view_model)) {
-        candidates.push_back(candidate);
-      }
+  for (const PoseCluster& c : cluster(votes, options, control)) {
+    Candidate candidate;
+    candidate.model_index = model_index;
+    candidate.T_view_model = pose_of(c, model);
+    candidate.votes = c.votes;
+    if (is_allowed(map, model, model_index, params.space, voted, candidate.T_view_model)) {
+      candidates.push_back(candidate);
     }
-    stats.cluster_count += candidates.size();
   }
-  // The paper compares each cluster with all points, and with nothing before.
-  if (params.verification == Verification::kAllPoints) return candidates;
-  const StageTimer timer(stats.verify_seconds);
+  return candidates;
+}
+
+/// Those that stand a coarse verification, best first.
+std::vector<Candidate> stand_coarsely(std::vector<Candidate> candidates, const DepthMap& map, const Model& model,
+                                      const DetectParams& params, const RunControl& control) {
   VerifyOptions coarse;
-  coarse.tolerance = kCoarseTolerance * diameter;
+  coarse.tolerance = kCoarseTolerance * static_cast<float>(model.diameter);
   coarse.normal_cosine = 0.7F;
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
   sort_by(&Evidence::promise, candidates);
   return first_of_each_place(candidates, model, params.refined_per_place, params.refine_limit, 0);
+}
+
+/// Where the model may be: a list of its own for each source of votes, so that contours need not outvote surfaces or be
+/// outvoted.
+std::vector<Candidate> find_candidates(std::array<Votes, 2> sources, const DepthMap& map, const Model& model,
+                                       int model_index, const DetectParams& params, const RunControl& control,
+                                       DetectStats& stats) {
+  std::array<std::vector<Candidate>, 2> found;
+  {
+    const StageTimer timer(stats.cluster_seconds);
+    parallel_for(static_cast<int>(sources.size()), control.threads, [&](int i) {
+      found[i] = cluster_votes(std::move(sources[i].votes), map, model, model_index, params, control);
+    });
+  }
+  const StageTimer timer(stats.verify_seconds);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    stats.cluster_count += found[i].size();
+    // The paper compares each cluster with all points, and with nothing before.
+    if (params.verification == Verification::kVisibleSurface) {
+      found[i] = stand_coarsely(std::move(found[i]), map, model, params, control);
+    }
+    candidates.insert(candidates.end(), found[i].begin(), found[i].end());
+  }
+  return candidates;
 }
 
 /// Refines each candidate and judges it anew.
@@ -220,22 +213,22 @@ bool is_allowed(const DepthMap& map, const Model& model, int model_index, const 
 
 std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,
                               const RunControl& control, DetectStats& stats) {
-  Votes by_surface, by_contour;
+  std::array<Votes, 2> sources;
   {
     const StageTimer timer(stats.vote_seconds);
     const RunControl first = control.with_share_of_time(kSurfaceVotesShare);
-    by_surface = surface_votes(map, model, params, first, stats);
+    sources[0] = surface_votes(map, model, params, first, stats);
     const RunControl second = control.with_share_of_time(kContourVotesShare);
-    if (params.use_contours) by_contour = contour_votes(map, model, second);
+    if (params.use_contours) sources[1] = contour_votes(map, model, second);
     if (first.past_deadline() || second.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   }
-  // A list of its own for each source, so that contours need not outvote surfaces or be outvoted.
   if (control.stop.stop_requested()) return {};
+  for (const Votes& votes : sources) {
+    stats.scene_pair_count += votes.scene_pairs;
+    stats.vote_count += votes.votes.size();
+  }
   std::vector<Candidate> candidates =
-      find_candidates(std::move(by_surface), map, model, model_index, params, control, stats);
-  const std::vector<Candidate> more =
-      find_candidates(std::move(by_contour), map, model, model_index, params, control, stats);
-  candidates.insert(candidates.end(), more.begin(), more.end());
+      find_candidates(std::move(sources), map, model, model_index, params, control, stats);
   if (params.refine) candidates = refine_to_the_end(map, model, std::move(candidates), params, control, stats);
   if (params.verification == Verification::kAllPoints) {
     candidates = compare_all_points(std::move(candidates), map, model, params, stats);
