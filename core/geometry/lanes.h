@@ -21,7 +21,7 @@ using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< ma
 
 /// In one go: a copy by memcpy is split into what the baseline loads before the function meets a wider processor.
 [[gnu::always_inline]] inline Lanes load_lanes(const float* values) {
-  using Unaligned = float __attribute__((vector_size(4 * kLanes), aligned(4), may_alias));
+  using Unaligned [[gnu::aligned(4), gnu::may_alias]] = Lanes;
   return *reinterpret_cast<const Unaligned*>(values);
 }
 
