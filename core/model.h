@@ -18,6 +18,12 @@
 
 namespace binpose {
 
+// Limits of a model's diameter: wide enough that a mesh in the wrong unit is trained, with a warning.
+inline constexpr double kSmallestDiameter = 1e-6;
+inline constexpr double kLargestDiameter = 1e4;
+/// Limit of a model's coordinates and of every other number in it: single precision holds four such, multiplied.
+inline constexpr double kLargestCoordinate = 1e8;
+
 /// All that training produced; immutable once built and shared between threads. io/model_file.h saves the stored
 /// members; derive() rebuilds the others.
 struct Model {

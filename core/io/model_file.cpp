@@ -191,15 +191,23 @@ std::string payload_of(const Model& model) {
   return writer.bytes();
 }
 
+/// False for what is not a number, too.
+bool bounded(double number) { return std::abs(number) <= kLargestCoordinate; }
+
+template <typename Derived>
+bool bounded(const Eigen::MatrixBase<Derived>& matrix) {
+  return matrix.unaryExpr([](double number) { return bounded(number); }).all();
+}
+
 bool sound(const std::vector<SurfacePoint>& points) {
   return points.size() <= 65535 && std::all_of(points.begin(), points.end(), [](const SurfacePoint& p) {
-           return p.position.allFinite() && std::abs(p.normal.norm() - 1) < 1e-3;
+           return bounded(p.position) && std::abs(p.normal.norm() - 1) < 1e-3;
          });
 }
 
 bool sound(const std::vector<ContourPoint>& contours) {
   return std::all_of(contours.begin(), contours.end(), [](const ContourPoint& c) {
-    return c.position.allFinite() && c.normal.allFinite() && c.outward.allFinite();
+    return bounded(c.position) && bounded(c.normal) && bounded(c.outward);
   });
 }
 
@@ -209,15 +217,15 @@ bool sound(const std::vector<std::vector<ContourPoint>>& outlines) {
 }
 
 bool sound(const std::vector<float>& weights) {
-  return std::all_of(weights.begin(), weights.end(), [](float weight) { return std::isfinite(weight) && weight >= 0; });
+  return std::all_of(weights.begin(), weights.end(), [](float weight) { return bounded(weight) && weight >= 0; });
 }
 
 bool sound(const std::vector<Pose>& poses) {
-  return std::all_of(poses.begin(), poses.end(), [](const Pose& pose) { return pose.matrix().allFinite(); });
+  return std::all_of(poses.begin(), poses.end(), [](const Pose& pose) { return bounded(pose.matrix()); });
 }
 
 bool sound(const Symmetry& symmetry) {
-  return !symmetry.discrete.empty() && symmetry.axis_point.allFinite() && symmetry.axis_direction.allFinite() &&
+  return !symmetry.discrete.empty() && bounded(symmetry.axis_point) && bounded(symmetry.axis_direction) &&
          sound(symmetry.discrete);
 }
 
@@ -225,8 +233,8 @@ bool sound(const Symmetry& symmetry) {
 bool invariants_hold(const Model& model) {
   const std::size_t points = model.pair_points.size(), scales = model.params.pair_lengths.size();
   return validate(model.params).ok() && model.params.selection >= PairSelection::kDistinctiveness &&
-         model.params.selection <= PairSelection::kSignalToNoise && model.diameter > 0 &&
-         std::isfinite(model.diameter) && model.box_min.allFinite() && model.box_max.allFinite() &&
+         model.params.selection <= PairSelection::kSignalToNoise && model.diameter >= kSmallestDiameter &&
+         model.diameter <= kLargestDiameter && bounded(model.box_min) && bounded(model.box_max) &&
          sound(model.surface) && sound(model.pair_points) && model.visibility.size() == model.surface.size() &&
          model.outlines.size() == static_cast<std::size_t>(model.params.viewpoint_count) && sound(model.outlines) &&
          sound(model.contour_points) && model.contour_points.size() <= 65535 &&
@@ -238,7 +246,7 @@ bool invariants_hold(const Model& model) {
                      }) &&
          model.pair_weights.size() == model.pairs.size() && sound(model.pair_weights) && sound(model.contour_weights) &&
          sound(model.symmetry) && sound(model.similar_poses) && sound(model.telling_points) &&
-         std::isfinite(model.telling_spacing) && model.telling_visibility.size() == model.telling_points.size() &&
+         bounded(model.telling_spacing) && model.telling_visibility.size() == model.telling_points.size() &&
          std::all_of(model.pairs.begin(), model.pairs.end(), [&](const VectorPair& pair) {
            return pair.p < points && pair.q1 < points && pair.q2 < points && pair.p != pair.q1 && pair.p != pair.q2 &&
                   pair.q1 != pair.q2 && pair.scale < scales;

@@ -6,13 +6,11 @@
 
 #include "absl/strings/str_format.h"
 #include "core/geometry/view_sphere.h"
+#include "core/model.h"
 
 namespace binpose {
 namespace {
 
-// Wide enough that a mesh in the wrong unit is trained, with a warning.
-constexpr double kSmallestDiameter = 1e-6;
-constexpr double kLargestDiameter = 1e4;
 /// Area over the square of the diameter, below which there is nothing to sample: a wire 3000 times as long as thick.
 constexpr double kLeastRelativeArea = 1e-3;
 /// Area over the square of the diameter, above which there is more surface than fits into memory as points; a sphere
@@ -37,6 +35,10 @@ absl::Status check_mesh(const Mesh& mesh, const RunControl& control) {
       if (!mesh.vertices[index].allFinite()) {
         return absl::InvalidArgumentError(
             absl::StrFormat("mesh vertex %d has a coordinate that is not a finite number.", index));
+      }
+      if (mesh.vertices[index].lpNorm<Eigen::Infinity>() > kLargestCoordinate) {
+        return absl::InvalidArgumentError(
+            absl::StrFormat("mesh vertex %d has a coordinate beyond %g m. Check the unit.", index, kLargestCoordinate));
       }
     }
   }

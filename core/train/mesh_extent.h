@@ -16,8 +16,8 @@ struct MeshExtent {
 };
 
 /// OK, or INVALID_ARGUMENT saying why nothing can be trained from this mesh: no triangles, an index out of range, a
-/// coordinate that is not finite, next to no area or far too much, or an extent outside [1 um, 10 km]; or what
-/// `control` says.
+/// coordinate that is not finite or far off, next to no area or far too much, or an extent outside [1 um, 10 km]; or
+/// what `control` says.
 absl::Status check_mesh(const Mesh& mesh, const RunControl& control = {});
 
 /// Extent of a mesh that check_mesh() accepts; of part of it when `control` interrupts.

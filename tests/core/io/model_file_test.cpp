@@ -136,6 +136,10 @@ TEST(ModelFile, RefusesNumbersThatWouldPoisonTheSearch) {
       {"contour weight", [](Model& m) { m.contour_weights[0] = kNan; }},
       {"symmetry pose", [](Model& m) { m.symmetry.discrete[0].matrix()(0, 3) = kNan; }},
       {"symmetry axis", [](Model& m) { m.symmetry.axis_direction.x() = kNan; }},
+      {"tiny diameter", [](Model& m) { m.diameter = 1e-30; }},
+      {"far box", [](Model& m) { m.box_max.x() = 1e300; }},
+      {"far point", [](Model& m) { m.pair_points[0].position.x() = 1e30F; }},
+      {"great weight", [](Model& m) { m.pair_weights[0] = 1e38F; }},
       {"number of surface points",
        [](Model& m) {
          m.visibility.resize(70'000, m.visibility[0]);

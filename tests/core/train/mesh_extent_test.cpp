@@ -52,9 +52,10 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
   flat.triangles = {{0, 0, 6}, {6, 6, 0}};
   const Mesh speck = testing::box({1e-4F, 1e-4F, 1e-4F});
   const Mesh specks = testing::joined(speck, testing::shifted(speck, {5, 0, 0}));
-  Mesh huge = good, tiny = good, overflowing = good;
+  Mesh huge = good, tiny = good, far = good, overflowing = good;
   for (Eigen::Vector3f& v : huge.vertices) v *= 1e6F;
   for (Eigen::Vector3f& v : tiny.vertices) v *= 1e-6F;
+  for (Eigen::Vector3f& v : far.vertices) v.x() += 1e9F;
   for (Eigen::Vector3f& v : overflowing.vertices) v *= 1e30F;
   Mesh folded = good;
   for (int i = 0; i < 200; ++i) {
@@ -67,6 +68,7 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
                            {specks, "a stray one lies far off"},
                            {huge, "diameter of 130000 m"},
                            {tiny, "Check the unit"},
+                           {far, "vertex 0 has a coordinate beyond 1e+08 m"},
                            {overflowing, "Check the unit"},
                            {folded, "doubled faces"}};
   EXPECT_TRUE(check_mesh(good).ok());
