@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs the Debian 12 packages that are missing, and nothing when none is. The one list of what binpose needs.
-# Usage: install-packages.sh run|build|test|fuzz
+# Usage: install-packages.sh run|build|test
 set -eu
 
 run="libabsl20220623 libcivetweb1 libgrpc++1.51 liblzf1 libpng16-16 libprometheus-cpp-core1.0
@@ -8,20 +8,18 @@ run="libabsl20220623 libcivetweb1 libgrpc++1.51 liblzf1 libpng16-16 libprometheu
 build="cmake g++ ninja-build
   libabsl-dev libcivetweb-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
-test="chromium chromium-driver clang-format clang-tidy curl fish git haproxy iproute2 libbenchmark-dev libbullet-dev
-  libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev openssl pkgconf prometheus python3
-  python3-grpcio python3-matplotlib python3-numpy python3-pil python3-protobuf python3-selenium python3-setuptools
-  python3-yaml shellcheck systemd zsh"
-fuzz="clang libclang-rt-14-dev"
+test="chromium chromium-driver clang clang-format clang-tidy curl fish git haproxy iproute2 libbenchmark-dev
+  libbullet-dev libclang-rt-14-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev openssl
+  pkgconf prometheus python3 python3-grpcio python3-matplotlib python3-numpy python3-pil python3-protobuf
+  python3-selenium python3-setuptools python3-yaml shellcheck systemd zsh"
 # Node.js from elsewhere brings its own npm and conflicts with Debian's.
 command -v npm >/dev/null || build="$build npm ca-certificates"
 case "${1:-}" in
   run) packages=$run ;;
   build) packages=$build ;;
   test) packages="$build $test" ;;
-  fuzz) packages="$build $fuzz" ;;
   *)
-    echo "Usage: $0 run|build|test|fuzz" >&2
+    echo "Usage: $0 run|build|test" >&2
     exit 2
     ;;
 esac
