@@ -14,7 +14,7 @@ std::string explain(const grpc::Status& status, const std::string& server) {
     case grpc::StatusCode::UNIMPLEMENTED:
       return "what answers at " + server + " does not offer this call: it is another service, or another version.";
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
-      // gRPC's own words: "Received message larger than max (SIZE vs. LIMIT)", in bytes.
+      // What gRPC says of a message so large that the server never sees it.
       if (status.error_message().find("larger than max") != std::string::npos) {
         return status.error_message() + ". Send less, or raise the server's --max-message-mib.";
       }

@@ -9,7 +9,7 @@
 
 namespace binpose::server {
 
-/// Bytes of requests that may be held at a time. Thread-safe.
+/// Bytes of requests: how many may be held at a time, and how many one message may have. Thread-safe.
 class MemoryBudget {
  public:
   /// A part of the budget, given back when it goes.
@@ -23,6 +23,11 @@ class MemoryBudget {
       std::swap(bytes_, other.bytes_);
       return *this;
     }
+    /// Takes what `other` holds of the same budget.
+    void add(Share other) {
+      budget_ = other.budget_;
+      bytes_ += std::exchange(other.bytes_, 0);
+    }
     ~Share() {
       if (budget_ != nullptr) budget_->used_ -= bytes_;
     }
@@ -32,14 +37,16 @@ class MemoryBudget {
     std::size_t bytes_ = 0;
   };
 
-  explicit MemoryBudget(std::size_t limit) : limit_(limit) {}
+  MemoryBudget(std::size_t limit, std::size_t message_limit) : limit_(limit), message_limit_(message_limit) {}
 
-  /// Errors: RESOURCE_EXHAUSTED (refused(), naming size, use and limit).
+  /// What a message of that size needs. Errors, each naming size, limit and option: RESOURCE_EXHAUSTED (a message that
+  /// is too large; or refused(), with the bytes in use, when there is no room now).
   absl::StatusOr<Share> take(std::size_t bytes);
   std::size_t used() const { return used_; }
 
  private:
   const std::size_t limit_;
+  const std::size_t message_limit_;
   std::atomic<std::size_t> used_ = 0;
 };
 

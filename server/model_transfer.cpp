@@ -87,10 +87,9 @@ absl::Status ImportCall::take(const v1::ImportModelRequest& part) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("data has more than %d bytes in all; that is the limit.", kMaxModelFileBytes));
   }
-  memory_ = {};
-  absl::StatusOr<MemoryBudget::Share> memory = backend_.requests.take(size);
+  absl::StatusOr<MemoryBudget::Share> memory = backend_.requests.take(part.ByteSizeLong());
   if (!memory.ok()) return memory.status();
-  memory_ = *std::move(memory);
+  memory_.add(*std::move(memory));
   bytes_ += part.data();
   return absl::OkStatus();
 }

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -36,6 +37,17 @@ void enable_standard_services() {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   // gRPC serves health without its descriptor; this keeps ours in the program, so that reflection can describe it.
   google::protobuf::LinkMessageReflection<grpc::health::v1::HealthCheckRequest>();
+}
+
+/// Bounds what gRPC holds: the messages in requests_ and two on their way.
+void limit_memory(const Config& config, grpc::ServerBuilder& builder) {
+  const std::size_t largest = static_cast<std::size_t>(config.max_message_mib) << 20;
+  const std::size_t held = static_cast<std::size_t>(config.request_memory_mib) << 20;
+  const std::size_t quota = held + 2 * largest;  // above it gRPC stops reading, then drops calls
+  builder.SetResourceQuota(grpc::ResourceQuota("binpose").Resize(quota));
+  // Above the limit, for requests_ says better than gRPC why a message is refused; but decoded it takes as much again.
+  const std::size_t most = std::min({2 * largest, quota / 2, std::size_t{std::numeric_limits<int>::max()}});
+  builder.SetMaxReceiveMessageSize(static_cast<int>(most));
 }
 
 /// Asks a silent peer whether it is there, so that the calls of one that vanished end within a minute.
@@ -71,7 +83,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const Config& config) {
 Server::Server(const Config& config)
     : config_(config),
       writes_(std::chrono::seconds(config.write_timeout_seconds)),
-      requests_(static_cast<std::size_t>(config.request_memory_mib) << 20),
+      requests_(static_cast<std::size_t>(config.request_memory_mib) << 20,
+                static_cast<std::size_t>(config.max_message_mib) << 20),
       detections_("detections", config.threads, static_cast<std::size_t>(config.queue)),
       trainings_("trainings", 1, kTrainingQueue, ComputePool::Priority::kLow) {}
 
@@ -132,11 +145,7 @@ absl::Status Server::listen() {
   grpc::ServerBuilder builder;
   builder.AddListeningPort(config_.listen, server_credentials(config_), &port);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // two servers on one port would share its calls
-  builder.SetMaxReceiveMessageSize(config_.max_message_mib << 20);
-  // Messages that are being received count here, not yet in requests_; above it gRPC stops reading, then drops calls.
-  const std::size_t largest = static_cast<std::size_t>(config_.max_message_mib) << 20;
-  const std::size_t held = static_cast<std::size_t>(config_.request_memory_mib) << 20;
-  builder.SetResourceQuota(grpc::ResourceQuota("binpose").Resize(held + 2 * largest));
+  limit_memory(config_, builder);
   reap_dead_peers(builder);
   builder.RegisterService(model_service_.get());
   builder.RegisterService(detection_service_.get());

@@ -35,7 +35,7 @@ TrainCall::TrainCall(const v1::TrainRequest& request, const Backend& backend, gr
 absl::Status TrainCall::admit(const absl::Status& allowed) {
   if (!allowed.ok()) return allowed;
   if (backend_.drain.started()) return absl::UnavailableError(kEnding);
-  absl::StatusOr<MemoryBudget::Share> memory = backend_.requests.take(request_.mesh().data().size());
+  absl::StatusOr<MemoryBudget::Share> memory = backend_.requests.take(request_.ByteSizeLong());
   if (!memory.ok()) return memory.status();
   memory_ = *std::move(memory);
   report(v1::TRAIN_STAGE_QUEUED, 0);

@@ -86,7 +86,7 @@ TEST_F(BusyPoolTest, ACallerThatHasGoneFreesItsPlaceWhileThePoolIsBusy) {
 }
 
 TEST(MemoryBudget, HoldsWhatSharesTakeAndGetsItBack) {
-  MemoryBudget budget(100);
+  MemoryBudget budget(100, 100);
   {
     auto share = budget.take(60);
     ASSERT_TRUE(share.ok());
@@ -96,6 +96,29 @@ TEST(MemoryBudget, HoldsWhatSharesTakeAndGetsItBack) {
     const MemoryBudget::Share moved = *std::move(share);
     EXPECT_EQ(budget.used(), 60);
   }
+  EXPECT_EQ(budget.used(), 0);
+}
+
+TEST(MemoryBudget, GivesSharesThatWereAddedBackTogether) {
+  MemoryBudget budget(100, 100);
+  {
+    MemoryBudget::Share sum;
+    sum.add(*budget.take(30));
+    sum.add(*budget.take(50));
+    EXPECT_EQ(budget.used(), 80);
+  }
+  EXPECT_EQ(budget.used(), 0);
+}
+
+TEST(MemoryBudget, AMessageThatIsTooLargeIsToldItsSizeTheLimitAndTheOptionAndNotToComeAgain) {
+  constexpr std::size_t kMiB = 1 << 20;
+  MemoryBudget budget(100 * kMiB, 2 * kMiB);
+  EXPECT_TRUE(budget.take(2 * kMiB).ok());
+  const absl::Status status = budget.take(2 * kMiB + 1).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(status.message(),
+            "The message has 2.1 MiB; the server's limit, --max-message-mib, is 2. Send less, or raise it.");
+  EXPECT_FALSE(retry_info_of(status).has_value());
   EXPECT_EQ(budget.used(), 0);
 }
 

@@ -61,7 +61,7 @@ class StreamServer final : public v1::DetectionService::WithRawCallbackMethod_De
   void note_cancel(CancelPlace /*place*/, double /*seconds*/) override {}
 
   Answer answer_;
-  MemoryBudget memory_{std::size_t{1} << 30};
+  MemoryBudget memory_{std::size_t{1} << 30, std::size_t{1} << 20};
   Drain drain_;
   WriteWatch writes_{std::chrono::milliseconds(500)};
   prometheus::Gauge streams_;

@@ -116,18 +116,33 @@ TEST_F(DetectionServiceTest, ACancelledStreamLeavesTheServerWell) {
   EXPECT_EQ(server().detect({detect_request("next", "block")}).size(), 1);
 }
 
-TEST_F(DetectionServiceTest, AMessageOverTheLimitIsRefusedNamingBothSizes) {
+TEST_F(DetectionServiceTest, AFrameOverTheLimitIsToldSizeLimitAndOptionAndTheStreamLivesOn) {
+  v1::DetectRequest large = detect_request("large", "block");
+  large.mutable_cloud()->set_pcd(std::string(std::size_t{70} << 20, ' '));
+  const auto answers = server().detect({large, detect_request("next", "block")});
+  ASSERT_EQ(answers.size(), 2);
+  EXPECT_EQ(answers[0].request_id(), "large");
+  EXPECT_EQ(answers[0].error().code(), kExhausted);
+  EXPECT_THAT(answers[0].error().message(), HasSubstr("70.1 MiB; the server's limit, --max-message-mib, is 64"));
+  EXPECT_FALSE(answers[0].error().has_retry_delay());
+  EXPECT_GE(answers[1].hypotheses_size(), 1);
+}
+
+TEST(DetectionServiceLimits, AFrameOfMoreThanTwiceTheLimitEndsTheCall) {
+  const TemporaryDirectory directory;
+  Config config = test_config(directory.path());
+  config.max_message_mib = 1;
+  config.request_memory_mib = 2;
+  RunningServer server(config);
   grpc::ClientContext context;
-  const auto stream = server().detections().Detect(&context);
-  v1::DetectRequest request = detect_request("large", "block");
-  request.mutable_cloud()->set_pcd(std::string(std::size_t{65} << 20, ' '));
+  const auto stream = server.detections().Detect(&context);
+  v1::DetectRequest request;
+  request.mutable_cloud()->set_pcd(std::string(std::size_t{3} << 20, ' '));
   stream->Write(request);
   stream->WritesDone();
   v1::DetectResponse answer;
   EXPECT_FALSE(stream->Read(&answer));
-  const grpc::Status status = stream->Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("67108864"));
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
 }
 
 TEST_F(DetectionServiceTest, AFrameThatIsNoRequestIsAnsweredAndTheStreamLivesOn) {

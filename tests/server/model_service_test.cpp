@@ -234,6 +234,14 @@ TEST_F(ModelServiceTest, AMeshAThousandTimesTooBigOrSmallForItsUnitIsTrainedWith
   EXPECT_EQ(messages.back().model().warnings_size(), 0);
 }
 
+TEST_F(ModelServiceTest, ATrainingOverTheLimitIsToldSizeLimitAndOption) {
+  v1::TrainRequest request = train_request("large");
+  request.mutable_mesh()->mutable_data()->resize(std::size_t{70} << 20);
+  const grpc::Status status = server_.train(request);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("70.1 MiB; the server's limit, --max-message-mib, is 64"));
+}
+
 /// A training request that is refused, and what the message must say.
 struct BadTraining {
   const char* name;

@@ -80,6 +80,27 @@ TEST_F(ModelTransferTest, BytesThatAreNotWholeAreRefusedAndTheOldModelStays) {
   }
 }
 
+TEST_F(ModelTransferTest, TheLimitOfAMessageIsThatOfAPieceNotOfTheModel) {
+  const TemporaryDirectory directory;
+  Config config = test_config(directory.path());
+  config.max_message_mib = 1;
+  RunningServer narrow(config);
+  ASSERT_GT(bytes_.size(), std::size_t{1} << 20);
+  v1::Model model;
+  EXPECT_TRUE(import_model(narrow, "block", bytes_, model).ok());
+  v1::ImportModelRequest whole;
+  whole.set_id("block");
+  whole.set_data(bytes_);
+  grpc::ClientContext context;
+  v1::ImportModelResponse response;
+  const auto stream = narrow.models().ImportModel(&context, &response);
+  stream->Write(whole);
+  stream->WritesDone();
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("MiB; the server's limit, --max-message-mib, is 1"));
+}
+
 TEST_F(ModelTransferTest, WhatCannotBeIsToldByName) {
   std::string bytes;
   const grpc::Status unknown = export_model(here_, "ghost", bytes);
