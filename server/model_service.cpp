@@ -33,7 +33,6 @@ absl::Status get_model(const ModelStore& models, const std::string& id, v1::Mode
 }
 
 absl::Status get_model_shape(ModelStore& models, const std::string& id, v1::GetModelShapeResponse& response) {
-  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   const auto stored = models.find(id);
   if (!stored.ok()) return stored.status();
   response = shape_of((*stored)->model);
@@ -41,7 +40,6 @@ absl::Status get_model_shape(ModelStore& models, const std::string& id, v1::GetM
 }
 
 absl::Status delete_model(const Backend& backend, const std::string& id) {
-  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   if (absl::Status status = backend.models.remove(id); !status.ok()) return status;
   spdlog::info("deleted {}", id);
   return absl::OkStatus();
@@ -77,9 +75,9 @@ grpc::ServerUnaryReactor* ModelService::GetModel(grpc::CallbackServerContext* co
 grpc::ServerUnaryReactor* ModelService::GetModelShape(grpc::CallbackServerContext* context,
                                                       const v1::GetModelShapeRequest* request,
                                                       v1::GetModelShapeResponse* response) {
-  return answer_on_pool(*context, Role::kDetect, Method::kGetModelShape, [this, id = request->id(), response] {
-    return get_model_shape(backend_.models, id, *response);
-  });
+  return answer_on_pool(
+      *context, Role::kDetect, Method::kGetModelShape, request->id(),
+      [this, response](const std::string& id) { return get_model_shape(backend_.models, id, *response); });
 }
 
 grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* context,
@@ -98,19 +96,21 @@ grpc::ServerUnaryReactor* ModelService::ListModels(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* ModelService::DeleteModel(grpc::CallbackServerContext* context,
                                                     const v1::DeleteModelRequest* request,
                                                     v1::DeleteModelResponse* /*response*/) {
-  return answer_on_pool(*context, Role::kTrain, Method::kDeleteModel,
-                        [this, id = request->id()] { return delete_model(backend_, id); });
+  return answer_on_pool(*context, Role::kTrain, Method::kDeleteModel, request->id(),
+                        [this](const std::string& id) { return delete_model(backend_, id); });
 }
 
 grpc::ServerUnaryReactor* ModelService::answer_on_pool(grpc::CallbackServerContext& context, Role role, Method method,
-                                                       std::function<absl::Status()> answer) {
+                                                       const std::string& id,
+                                                       std::function<absl::Status(const std::string& id)> answer) {
   const Clock::time_point arrival = Clock::now();
   grpc::ServerUnaryReactor* reactor = context.DefaultReactor();
   absl::Status admitted = backend_.tokens.check(context, role);
+  if (admitted.ok()) admitted = check_model_id("id", id);
   if (admitted.ok()) {
     const auto call = std::make_shared<Drain::Call>(backend_.drain);
-    admitted = backend_.detections.submit([this, call, reactor, arrival, method, answer = std::move(answer)] {
-      finish(reactor, backend_.metrics, method, arrival, contain_exceptions(answer));
+    admitted = backend_.detections.submit([this, call, reactor, arrival, method, id, answer = std::move(answer)] {
+      finish(reactor, backend_.metrics, method, arrival, contain_exceptions([&] { return answer(id); }));
     });
   }
   if (!admitted.ok()) finish(reactor, backend_.metrics, method, arrival, admitted);

@@ -28,9 +28,11 @@ class ModelService final : public v1::ModelService::CallbackService {
                                         v1::DeleteModelResponse* response) override;
 
  private:
-  /// Ends a unary call with what `answer` returns, which may wait for the disk.
+  /// Ends a unary call about model `id` with what `answer` returns, which may wait for the disk. What is no ID is
+  /// refused before it waits, since it may be as long as a message.
   grpc::ServerUnaryReactor* answer_on_pool(grpc::CallbackServerContext& context, Role role, Method method,
-                                           std::function<absl::Status()> answer);
+                                           const std::string& id,
+                                           std::function<absl::Status(const std::string& id)> answer);
 
   Backend backend_;
 };

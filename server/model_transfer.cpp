@@ -22,6 +22,7 @@ ExportCall::ExportCall(const std::string& id, const Backend& backend, grpc::Call
     : backend_(backend), context_(context), call_(backend.drain) {
   absl::Status status = allowed;
   if (status.ok() && backend_.drain.started()) status = absl::UnavailableError(kEnding);
+  if (status.ok()) status = check_model_id("id", id);
   if (status.ok()) {
     status = backend_.detections.submit([this, id] {
       const absl::Status prepared = contain_exceptions([&] { return prepare(id); });
@@ -32,7 +33,6 @@ ExportCall::ExportCall(const std::string& id, const Backend& backend, grpc::Call
 }
 
 absl::Status ExportCall::prepare(const std::string& id) {
-  if (absl::Status status = check_model_id("id", id); !status.ok()) return status;
   const auto stored = backend_.models.find(id);
   if (!stored.ok()) return stored.status();
   bytes_ = seal_envelope(**stored);
