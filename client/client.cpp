@@ -143,9 +143,9 @@ absl::StatusOr<v1::Model> Client::import_model(const std::string& id, const std:
   return response.model();
 }
 
-absl::StatusOr<v1::DetectResponse> Client::detect(const v1::DetectRequest& request) {
+absl::StatusOr<v1::DetectResponse> Client::detect(Scan scan) {
   const std::unique_ptr<DetectStream> stream = open_detect_stream();
-  if (absl::Status status = stream->write(borrowed(request)); !status.ok()) return status;
+  if (absl::Status status = stream->write(std::move(scan)); !status.ok()) return status;
   stream->done_writing();
   std::optional<v1::DetectResponse> answer = stream->read();
   if (absl::Status status = stream->finish(); !status.ok()) return status;

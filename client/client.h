@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -46,7 +47,10 @@ class Client {
   absl::StatusOr<v1::Model> import_model(const std::string& id, const std::string& bytes);
 
   /// Searches one scan. An answer that carries an `error` becomes that error.
-  absl::StatusOr<v1::DetectResponse> detect(const v1::DetectRequest& request);
+  absl::StatusOr<v1::DetectResponse> detect(Scan scan);
+  absl::StatusOr<v1::DetectResponse> detect(v1::DetectRequest request) {
+    return detect(std::make_shared<const v1::DetectRequest>(std::move(request)));
+  }
 
   /// Opens a stream for any number of scans. It may outlive the client.
   std::unique_ptr<DetectStream> open_detect_stream();

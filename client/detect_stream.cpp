@@ -102,7 +102,7 @@ grpc::Status DetectStream::attempt(const Stubs& server, bool& was_answered) {
     attempt_ = &attempt;
     if (is_cancelled_) attempt.context.TryCancel();
   }
-  attempt.stream = server.detection->Detect(&attempt.context);
+  attempt.stream = open_detect(server, attempt.context);
   // Beside the reading: the server takes no more scans while its answers are not taken.
   std::thread sender([&] { send(attempt); });
   v1::DetectResponse answer;
@@ -131,7 +131,8 @@ void DetectStream::send(Attempt& attempt) {
     const Scan scan = unanswered_[attempt.next++ - answered_];
     const std::uint64_t sent = attempt.next;
     lock.unlock();
-    if (!attempt.stream->Write(*scan)) return;
+    const grpc::ByteBuffer bytes = encode(scan);
+    if (!bytes.Valid() || !attempt.stream->Write(bytes)) return;
     lock.lock();
     sent_ = std::max(sent_, sent);
     changed_.notify_all();

@@ -14,15 +14,10 @@
 #include "absl/status/status.h"
 #include "binpose/v1/detection_service.pb.h"
 #include "client/connection.h"
+#include "client/encode_scan.h"
 #include "client/servers.h"
 
 namespace binpose::client {
-
-/// A scan that lives as long as somebody needs it.
-using Scan = std::shared_ptr<const v1::DetectRequest>;
-
-/// A scan that its owner keeps until it is answered or the stream is gone.
-inline Scan borrowed(const v1::DetectRequest& request) { return {Scan(), &request}; }
 
 /// A stream of scans to search: one answer a scan, in order.
 ///
@@ -68,7 +63,7 @@ class DetectStream {
   /// One call to the server.
   struct Attempt {
     grpc::ClientContext context;
-    std::unique_ptr<grpc::ClientReaderWriter<v1::DetectRequest, v1::DetectResponse>> stream;
+    std::unique_ptr<DetectCall> stream;
     std::uint64_t next = 0;  ///< the scan to send next, by its number
     bool is_over = false;
   };

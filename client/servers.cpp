@@ -89,8 +89,7 @@ std::chrono::milliseconds pause_before(int attempt, const Retries& retries) {
 Servers::Servers(const Connection& connection) : name_(connection.server) {
   for (const std::string& address : split(connection.server)) {
     const std::shared_ptr<grpc::Channel> channel = open_channel(address, connection);
-    stubs_.push_back({channel, grpc::health::v1::Health::NewStub(channel), v1::ModelService::NewStub(channel),
-                      v1::DetectionService::NewStub(channel)});
+    stubs_.push_back({channel, grpc::health::v1::Health::NewStub(channel), v1::ModelService::NewStub(channel)});
   }
 }
 
@@ -103,6 +102,15 @@ void set_routing_key(const std::string& model_id, grpc::ClientContext& context) 
   const auto is_printable = [](char c) { return c > ' ' && c <= '~'; };
   if (model_id.empty() || !std::all_of(model_id.begin(), model_id.end(), is_printable)) return;
   context.AddMetadata("x-model-id", model_id);
+}
+
+std::unique_ptr<DetectCall> open_detect(const Stubs& server, grpc::ClientContext& context) {
+  // What the generated stub does; it takes messages only, and encodes them with a copy.
+  const grpc::internal::RpcMethod method("/binpose.v1.DetectionService/Detect",
+                                         grpc::internal::RpcMethod::BIDI_STREAMING);
+  return std::unique_ptr<DetectCall>(
+      grpc::internal::ClientReaderWriterFactory<grpc::ByteBuffer, v1::DetectResponse>::Create(server.channel.get(),
+                                                                                              method, &context));
 }
 
 bool is_lost(const grpc::Status& status) {

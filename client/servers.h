@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "binpose/v1/detection_service.grpc.pb.h"
+#include "binpose/v1/detection_service.pb.h"
 #include "binpose/v1/model_service.grpc.pb.h"
 #include "client/connection.h"
 #include "grpc/health/v1/health.grpc.pb.h"
@@ -19,7 +19,6 @@ struct Stubs {
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<grpc::health::v1::Health::Stub> health;
   std::unique_ptr<v1::ModelService::Stub> models;
-  std::unique_ptr<v1::DetectionService::Stub> detection;
 };
 
 /// The servers of a connection, of which one is called until it is lost. Connects with the first call. Thread-safe.
@@ -44,6 +43,10 @@ class Servers {
 /// Tells a balancer which model a call is about, so that all calls about it go to one server: what one call did is seen
 /// by the next. An ID that cannot be a header is left out.
 void set_routing_key(const std::string& model_id, grpc::ClientContext& context);
+
+/// A call of DetectionService.Detect whose scans are encoded already.
+using DetectCall = grpc::ClientReaderWriter<grpc::ByteBuffer, v1::DetectResponse>;
+std::unique_ptr<DetectCall> open_detect(const Stubs& server, grpc::ClientContext& context);
 
 /// Whether a call ended because its server did, or the way to it, rather than because of what was asked.
 bool is_lost(const grpc::Status& status);

@@ -69,7 +69,7 @@ ExitCode bench(BenchOptions& options, const GlobalOptions& global) {
       report(request.status());
       return kUnreadable;
     }
-    options.plan.requests.push_back(*std::move(request));
+    options.plan.requests.push_back(std::make_shared<const v1::DetectRequest>(*std::move(request)));
   }
   Client client = connect(global);
   // Before any load: does the server answer, and know the models?

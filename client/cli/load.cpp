@@ -54,7 +54,7 @@ class StreamLoad {
     for (std::uint64_t i = 0; i < count_; ++i) {
       std::this_thread::sleep_until(due(i));
       const bool is_over = seconds_between(start_, Clock::now()) > plan_.duration;
-      if (is_over || !stream_->write(borrowed(plan_.requests[index_of(i) % plan_.requests.size()])).ok()) {
+      if (is_over || !stream_->write(plan_.requests[index_of(i) % plan_.requests.size()]).ok()) {
         report_.unsent = count_ - i;
         break;
       }

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "binpose/v1/detection_service.pb.h"
 #include "client/cli/histogram.h"
 #include "client/client.h"
 
@@ -14,8 +13,8 @@ namespace binpose::client::cli {
 
 /// An open-loop load: scans become due at a fixed rate, whether or not the server keeps up.
 struct LoadPlan {
-  std::vector<v1::DetectRequest> requests;  ///< sent in turn, again and again
-  double rate = 1;                          ///< scans a second, over all streams
+  std::vector<Scan> requests;  ///< sent in turn, again and again
+  double rate = 1;             ///< scans a second, over all streams
   int streams = 1;
   double duration = 10;  ///< seconds in which scans become due
 };

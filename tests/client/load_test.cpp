@@ -17,9 +17,11 @@ using ::testing::Pair;
 /// Four scans in a second, so that even a busy machine sends the last in time.
 LoadPlan small_plan() {
   LoadPlan plan;
-  plan.requests.resize(2);
-  plan.requests[0].set_request_id("a");
-  plan.requests[1].set_request_id("b");
+  for (const char* id : {"a", "b"}) {
+    v1::DetectRequest request;
+    request.set_request_id(id);
+    plan.requests.push_back(std::make_shared<const v1::DetectRequest>(std::move(request)));
+  }
   plan.rate = 4;
   plan.duration = 1;
   return plan;
