@@ -72,32 +72,46 @@ bool in_a_row(const VectorFields& fields) {
   return true;
 }
 
+/// Three floats every `point_bytes`.
+void read_rows(const char* first, std::size_t point_bytes, float scale, std::vector<Eigen::Vector3f>& vectors) {
+  if (point_bytes == sizeof(Eigen::Vector3f)) {  // nothing but them: one flat loop, which the compiler vectorises
+    float* const numbers = vectors.front().data();
+    for (std::size_t i = 0; i < 3 * vectors.size(); ++i) {
+      numbers[i] = scale * float_at(first + i * sizeof(float), sizeof(float));
+    }
+    return;
+  }
+  for (Eigen::Vector3f& vector : vectors) {
+    std::memcpy(vector.data(), first, sizeof(vector));
+    vector *= scale;
+    first += point_bytes;
+  }
+}
+
 /// The data of a "binary" body: point after point.
-absl::Status read_binary(std::string_view body, std::size_t point_bytes, const VectorFields& fields,
+absl::Status read_binary(std::string_view body, std::size_t point_bytes, const VectorFields& fields, float scale,
                          std::vector<Eigen::Vector3f>& vectors) {
   if (body.size() < point_bytes * vectors.size()) return truncated(point_bytes * vectors.size(), body.size());
   if (in_a_row(fields)) {  // the usual layout, in a third of the time
-    const char* first = body.data() + fields[0]->offset;
-    for (Eigen::Vector3f& vector : vectors) {
-      std::memcpy(vector.data(), first, 3 * sizeof(float));
-      first += point_bytes;
-    }
+    read_rows(body.data() + fields[0]->offset, point_bytes, scale, vectors);
     return absl::OkStatus();
   }
   for (std::size_t i = 0; i < vectors.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
-      vectors[i][axis] = float_at(body.data() + i * point_bytes + fields[axis]->offset, fields[axis]->size);
+      const char* bytes = body.data() + i * point_bytes + fields[axis]->offset;
+      vectors[i][axis] = scale * float_at(bytes, fields[axis]->size);
     }
   }
   return absl::OkStatus();
 }
 
 /// The data of a decompressed "binary_compressed" body: field after field.
-void read_field_by_field(std::string_view data, const VectorFields& fields, std::vector<Eigen::Vector3f>& vectors) {
+void read_field_by_field(std::string_view data, const VectorFields& fields, float scale,
+                         std::vector<Eigen::Vector3f>& vectors) {
   for (int axis = 0; axis < 3; ++axis) {
     const char* column = data.data() + fields[axis]->offset * vectors.size();
     for (std::size_t i = 0; i < vectors.size(); ++i) {
-      vectors[i][axis] = float_at(column + i * fields[axis]->size, fields[axis]->size);
+      vectors[i][axis] = scale * float_at(column + i * fields[axis]->size, fields[axis]->size);
     }
   }
 }
@@ -128,7 +142,8 @@ absl::StatusOr<std::string> decompress(std::string_view body, std::size_t expect
 
 /// The data of an "ascii" body: one word per number, for both kinds of vector at once.
 absl::Status read_ascii(std::string_view body, const PcdHeader& header, const VectorFields& xyz,
-                        const std::optional<VectorFields>& normal, const RunControl& control, PointCloud& cloud) {
+                        const std::optional<VectorFields>& normal, float scale, const RunControl& control,
+                        PointCloud& cloud) {
   TextCursor cursor{body};
   std::vector<std::string_view> words(header.point_numbers);
   const auto read_vector = [&](const VectorFields& fields, Eigen::Vector3f& vector) {
@@ -148,22 +163,25 @@ absl::Status read_ascii(std::string_view body, const PcdHeader& header, const Ve
           "Point %d of %d in the PCD file (counted from 0) is truncated or has a word that is no number.", i,
           cloud.points.size()));
     }
+    cloud.points[i] *= scale;
   }
   return absl::OkStatus();
 }
 
+/// Fills points, times `scale`, and normals.
 absl::Status read_body(std::string_view body, const PcdHeader& header, const VectorFields& xyz,
-                       const std::optional<VectorFields>& normal, const RunControl& control, PointCloud& cloud) {
-  if (header.encoding == PcdEncoding::kAscii) return read_ascii(body, header, xyz, normal, control, cloud);
+                       const std::optional<VectorFields>& normal, float scale, const RunControl& control,
+                       PointCloud& cloud) {
+  if (header.encoding == PcdEncoding::kAscii) return read_ascii(body, header, xyz, normal, scale, control, cloud);
   if (header.encoding == PcdEncoding::kBinary) {
-    absl::Status status = read_binary(body, header.point_bytes, xyz, cloud.points);
-    if (status.ok() && normal.has_value()) status = read_binary(body, header.point_bytes, *normal, cloud.normals);
+    absl::Status status = read_binary(body, header.point_bytes, xyz, scale, cloud.points);
+    if (status.ok() && normal.has_value()) status = read_binary(body, header.point_bytes, *normal, 1, cloud.normals);
     return status;
   }
   const absl::StatusOr<std::string> plain = decompress(body, header.point_bytes * header.point_count());
   if (!plain.ok()) return plain.status();
-  read_field_by_field(*plain, xyz, cloud.points);
-  if (normal.has_value()) read_field_by_field(*plain, *normal, cloud.normals);
+  read_field_by_field(*plain, xyz, scale, cloud.points);
+  if (normal.has_value()) read_field_by_field(*plain, *normal, 1, cloud.normals);
   return absl::OkStatus();
 }
 
@@ -182,9 +200,10 @@ absl::StatusOr<PointCloud> read_pcd(std::string_view bytes, double metres_per_un
   PointCloud cloud;
   cloud.points.resize(header->point_count());
   if (normal->has_value()) cloud.normals.resize(header->point_count());
-  if (absl::Status status = read_body(body, *header, **xyz, *normal, control, cloud); !status.ok()) return status;
+  const auto scale = static_cast<float>(metres_per_unit);
+  absl::Status status = read_body(body, *header, **xyz, *normal, scale, control, cloud);
+  if (!status.ok()) return status;
   if (absl::Status status = control.status(); !status.ok()) return status;
-  for (Eigen::Vector3f& point : cloud.points) point *= static_cast<float>(metres_per_unit);
   normalize_or_drop_normals(cloud);
   cloud.width = static_cast<std::uint32_t>(header->width);
   cloud.height = static_cast<std::uint32_t>(header->height);
