@@ -6,16 +6,27 @@
 set -eu
 cd "$(dirname "$0")/.."
 
+# run_tests PRESET TEST...: each in as many shards as there are cores. Shows what a failed shard printed, and goes on
+# with the others.
 run_tests() {
   preset="$1"
   shift
+  GTEST_TOTAL_SHARDS="$(nproc)"
+  export GTEST_TOTAL_SHARDS
+  # shellcheck disable=SC2016  # the inner shell expands them
   for test in "$@"; do
-    echo "== $preset $test"
-    "build/$preset/bin/$test" --gtest_brief=1
-  done
+    seq -f "build/$preset/bin/$test %g" 0 $((GTEST_TOTAL_SHARDS - 1))
+  done | xargs -P "$GTEST_TOTAL_SHARDS" -L 1 sh -c '
+    if output=$(GTEST_SHARD_INDEX=$1 "$0" 2>&1); then
+      echo "passed: $0, shard $1"
+    else
+      printf "%s\nFAILED: %s, shard %s\n" "$output" "$0" "$1"
+      exit 1
+    fi'
 }
 
 [ $# -gt 0 ] || set -- asan tsan
+failed=""
 for preset in "$@"; do
   cmake --preset "$preset" >/dev/null
   case "$preset" in
@@ -25,7 +36,7 @@ for preset in "$@"; do
       export ASAN_OPTIONS=alloc_dealloc_mismatch=0:detect_stack_use_after_return=1
       export LSAN_OPTIONS=suppressions=tests/sanitize_suppressions.txt
       # shellcheck disable=SC2046  # names of tests have no spaces
-      run_tests asan $(cd build/asan/bin && ls -- *_test)
+      run_tests asan $(cd build/asan/bin && ls -- *_test) || failed=yes
       ;;
     tsan)
       tests="geometry_test train_test detect_test matching_tables_test"
@@ -33,8 +44,9 @@ for preset in "$@"; do
       cmake --build build/tsan --target $tests server_parts_test
       export TSAN_OPTIONS=halt_on_error=1
       # shellcheck disable=SC2086
-      run_tests tsan $tests
-      GTEST_FILTER="ComputePool*:ModelStore*" run_tests tsan server_parts_test
+      run_tests tsan $tests || failed=yes
+      GTEST_FILTER="ComputePool*:ModelStore*" run_tests tsan server_parts_test || failed=yes
       ;;
   esac
 done
+[ -z "$failed" ]
