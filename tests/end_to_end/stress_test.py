@@ -1,6 +1,7 @@
 """What the service promises under load, faults and abuse. BINPOSE_STRESS=full runs the issue's whole figures, else a
 short form; each test prints its figure as one line that starts with its name."""
 
+import base64
 import concurrent.futures
 import math
 import os
@@ -423,6 +424,8 @@ class CostTest(StressTest):
 
 @unittest.skipUnless(BUF.exists(), "buf is not installed")
 class ForeignClientTest(StressTest):
+    arguments = ["--max-message-mib", "8"]
+
     def curl(self, method, data):
         run = subprocess.run([BUF, "curl", "--http2-prior-knowledge", "--protocol", "grpc",
                               f"http://{self.server.address}/binpose.v1.{method}", "-d", "@-"],
@@ -441,6 +444,19 @@ class ForeignClientTest(StressTest):
         self.assertNotEqual(status, 0)
         self.assertIn("not_found", error)
         figure("foreign client", "buf curl: reflection, unary, stream and errors")
+
+    def test_a_client_that_is_not_ours_reads_why_a_message_is_too_large(self):
+        large = base64.b64encode(bytes(9 << 20)).decode()
+        status, answers = self.curl("DetectionService/Detect",
+                                    f'{{"cloud": {{"pcd": "{large}"}}}} {{"requestId": "next"}}')
+        self.assertEqual(status, 0, answers)
+        self.assertIn('"requestId": "next"', answers)
+        status, error = self.curl("ModelService/Train", f'{{"id": "large", "mesh": {{"data": "{large}"}}}}')
+        self.assertNotEqual(status, 0)
+        sentence = "The message has 9.1 MiB; the server's limit, --max-message-mib, is 8."
+        self.assertIn(sentence, answers)
+        self.assertIn(sentence, error)
+        figure("message over the limit", f"buf curl reads, of a frame and of a call: {sentence}")
 
 
 class SoakTest(StressTest):
