@@ -460,13 +460,14 @@ class ForeignClientTest(StressTest):
 
 
 class SoakTest(StressTest):
-    @unittest.skipUnless(FULL, "takes minutes")
+    @unittest.skipUnless(FULL or "BINPOSE_SOAK_MINUTES" in os.environ, "takes minutes: end_to_end.soak is its short form")
     def test_memory_does_not_grow(self):
         minutes = float(os.environ.get("BINPOSE_SOAK_MINUTES", "3"))
         samples = []
         start = time.monotonic()
         while (elapsed := time.monotonic() - start) < 60 * minutes:
             self.assert_serves()
+            time.sleep(0.05)  # other tests want a core, too
             if elapsed > 10 * minutes:  # a sixth for warm-up
                 samples.append((elapsed / 3600, self.server.resident_bytes() / 2**20))
         mean_x = sum(x for x, _ in samples) / len(samples)
@@ -474,8 +475,10 @@ class SoakTest(StressTest):
         slope = sum((x - mean_x) * (y - mean_y) for x, y in samples) / sum((x - mean_x) ** 2 for x, _ in samples)
         figure("soak", f"{minutes:.0f} minutes, {len(samples)} detections after warm-up, RSS {samples[0][1]:.1f} MiB then "
                f"{samples[-1][1]:.1f} MiB, slope {slope:.2f} MiB/h")
-        if minutes >= 30:  # a shorter one cannot tell 1 MiB/h from noise
+        if minutes >= 30:
             self.assertLess(slope, 1)
+        else:  # too short to tell 1 MiB/h from noise; what every scan left behind would show all the same
+            self.assertLess(samples[-1][1] - samples[0][1], 4)
 
 
 if __name__ == "__main__":
