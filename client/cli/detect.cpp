@@ -95,14 +95,15 @@ ExitCode detect_and_draw(const ScanOptions& options, const ResultPageOptions& dr
     return kUnreadable;
   }
   if (!options.max_rejected.has_value()) request->mutable_params()->set_max_rejected(kRejectedOnPage);
-  const absl::StatusOr<v1::DetectResponse> answer = client.detect(*request);
+  const Scan scan = std::make_shared<const v1::DetectRequest>(*std::move(request));
+  const absl::StatusOr<v1::DetectResponse> answer = client.detect(scan);
   if (!answer.ok()) return report_call({answer.status().code(), scene + ": " + std::string(answer.status().message())});
   if (json) {
     std::cout << answer_json(*answer) << std::endl;
   } else {
     print_answer(*answer, scene, options.unit);
   }
-  if (absl::Status status = write_result_page(drawing, *request, *answer, client); !status.ok()) {
+  if (absl::Status status = write_result_page(drawing, *scan, *answer, client); !status.ok()) {
     report(status);
     return kUnreadable;
   }
