@@ -8,7 +8,7 @@ seconds="${1:-60}"
 target="${2:-}"
 if [ -z "$target" ]; then
   cmake --workflow --preset fuzz
-  printf '%s\n' mesh cloud model_file request | xargs -P "$(nproc)" -n 1 "$0" "$seconds"
+  find tests/fuzz/corpus -mindepth 1 -type d -printf '%f\n' | xargs -P "$(nproc)" -n 1 "$0" "$seconds"
   exit
 fi
 
