@@ -14,17 +14,19 @@ constexpr double kRelativePixel = 0.014;
 constexpr double kPixelPerSpacing = 1.2;
 constexpr float kContourStep = 0.03F;
 
-/// Normals from the smallest windows that the noise allows: wide ones round off edges.
+/// Normals from the smallest windows that the noise allows: wide ones blur small faces.
 void estimate_steady_normals(DepthMap& map, const RunControl& control) {
   constexpr int kWidest = 3;
   constexpr double kNormalError = 4 * kDegree;
-  estimate_normals(map, 1, control);
+  std::vector<float> deviations = estimate_normals(map, 1, control);
   const float noise = map.noise;
   int radius = 1;
   while (radius < kWidest && normal_error(noise, map.pixel_size, radius) > kNormalError) ++radius;
-  if (radius == 1) return;
-  estimate_normals(map, radius, control);
-  map.noise = noise;
+  if (radius > 1) {
+    deviations = estimate_normals(map, radius, control);
+    map.noise = noise;
+  }
+  sharpen_normals(map, deviations, radius, control);
 }
 
 }  // namespace

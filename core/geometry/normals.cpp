@@ -14,6 +14,10 @@ constexpr float kSteadyCosine = 0.5F;  // noise is judged on surfaces within 60 
 constexpr int kFewestNeighbours = 4;   // besides the pixel itself, in a 3 x 3 window
 /// Depth step between neighbours, in pixel widths per pixel, beyond which they lie on different surfaces.
 constexpr float kSteepest = 3.0F;
+/// A window is plane, whatever its noise, when its points deviate by less, in pixel widths.
+constexpr float kFlat = 0.02F;
+constexpr float kMuchQuieter = 0.7F;
+constexpr float kOnPlane = 2.0F;  // deviations that a point of the plane may be off it
 
 /// The measured points of a map as inverse depth over the image, one array each, with a margin of nothing measured.
 struct RayImage {
@@ -80,10 +84,16 @@ struct PlaneFit {
   }
 };
 
-/// Normals of a row of pixels; `deviations` gets how far each whole window's points lie off its plane, along the
-/// normal, metres.
+/// How far the points of each pixel's window lie off its plane, along the normal, metres; infinite where unknown.
+struct Deviations {
+  std::vector<float> all, steady;  ///< those of whole windows that face the sensor apart: they tell of its noise
+
+  explicit Deviations(std::size_t count) : all(count, INFINITY), steady(count, INFINITY) {}
+};
+
+/// Normals of a row of pixels.
 BINPOSE_VECTORISED
-void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, std::vector<float>& deviations) {
+void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, Deviations& deviations) {
   const auto whole = static_cast<float>((2 * radius + 1) * (2 * radius + 1));
   const float steepest = kSteepest * static_cast<float>(radius) / map.focal;
   for (int u = 0; u < map.width; u += kLanes) {
@@ -112,20 +122,59 @@ void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, std::vector
       if (!map.measured(i)) continue;
       const Eigen::Vector3f normal = -Eigen::Vector3f(a[lane], b[lane], c[lane]) / length[lane];
       map.pixels[i].normal = good[lane] != 0 ? normal : Eigen::Vector3f(0, 0, 0);
-      deviations[i] = steady[lane] != 0 ? off[lane] : -1;
+      if (good[lane] != 0) deviations.all[i] = off[lane];
+      if (steady[lane] != 0) deviations.steady[i] = off[lane];
     }
   }
 }
 
 /// The noise that explains the quietest windows: edges and curvature only make others louder.
 float noise_of(std::vector<float> deviations) {
-  std::erase_if(deviations, [](float d) { return d < 0; });
+  std::erase_if(deviations, [](float d) { return std::isinf(d); });
   if (deviations.empty()) return 0;
   const auto quarter = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 4);
   std::nth_element(deviations.begin(), quarter, deviations.end());
   // A quarter of the windows of 9 points on a plane deviate by less than this share of the noise: sqrt(chi^2_6 / 6).
   constexpr float kQuarterOfNine = 0.76F;
   return *quarter / kQuarterOfNine;
+}
+
+/// The window around a pixel, its own or one beside it, that describes it best.
+int quietest_window(const DepthMap& map, const std::vector<float>& deviations, int u, int v, int radius) {
+  const int own = v * map.width + u;
+  const float flat = kFlat * map.pixel_size;
+  if (deviations[own] < flat) return own;
+  float least = kMuchQuieter * deviations[own];
+  int quietest = own;
+  for (int row = v - radius; row <= v + radius; row += radius) {
+    for (int column = u - radius; column <= u + radius; column += radius) {
+      if (row < 0 || row >= map.height || column < 0 || column >= map.width) continue;
+      const int i = row * map.width + column;
+      if (!(deviations[i] < least)) continue;
+      const float off = map.pixels[i].normal.dot(map.pixels[own].position - map.pixels[i].position);
+      if (std::abs(off) > kOnPlane * deviations[i] + flat) continue;
+      least = deviations[i];
+      quietest = i;
+    }
+  }
+  return quietest;
+}
+
+struct SharpNormal {
+  int pixel;
+  Eigen::Vector3f normal;
+};
+
+/// The normals of a row that another window than their own gives.
+std::vector<SharpNormal> sharpen_row(const DepthMap& map, const std::vector<float>& deviations, int v, int radius) {
+  std::vector<SharpNormal> sharper;
+  for (int u = 0; u < map.width; ++u) {
+    const int i = v * map.width + u;
+    if (!map.measured(i)) continue;
+    const int window = quietest_window(map, deviations, u, v, radius);
+    if (window != i) sharper.push_back({i, map.pixels[window].normal});
+  }
+  return sharper;
 }
 
 }  // namespace
@@ -136,14 +185,25 @@ double normal_error(double noise, double pixel_size, int radius) {
   return noise / (pixel_size * std::sqrt(sum_sq_offset));
 }
 
-void estimate_normals(DepthMap& map, int radius, const RunControl& control) {
-  std::vector<float> deviations(map.pixels.size(), -1);
+std::vector<float> estimate_normals(DepthMap& map, int radius, const RunControl& control) {
+  Deviations deviations(map.pixels.size());
   const RayImage rays(map, radius);
   parallel_for(map.height, control.threads, [&](int v) {
     if (!control.interrupted()) fit_row(map, rays, v, radius, deviations);
   });
+  if (!control.interrupted()) map.noise = noise_of(std::move(deviations.steady));
+  return std::move(deviations.all);
+}
+
+void sharpen_normals(DepthMap& map, const std::vector<float>& deviations, int radius, const RunControl& control) {
+  std::vector<std::vector<SharpNormal>> rows(map.height);
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (!control.interrupted()) rows[v] = sharpen_row(map, deviations, v, radius);
+  });
   if (control.interrupted()) return;
-  map.noise = noise_of(std::move(deviations));
+  for (const std::vector<SharpNormal>& row : rows) {
+    for (const SharpNormal& sharp : row) map.pixels[sharp.pixel].normal = sharp.normal;
+  }
 }
 
 }  // namespace binpose

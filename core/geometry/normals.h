@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "core/geometry/depth_map.h"
 #include "core/run_control.h"
 
@@ -13,8 +15,16 @@ constexpr float kGrazingCosine = 0.17364818F;
 /// more than 80 degrees get no normal. Also sets the map's noise, from the windows that are most nearly plane.
 ///
 /// @param radius  of the window, pixels: 1 = 3 x 3.
+/// @return  per pixel the standard deviation of its window's points from the plane, metres; infinite without a normal.
 /// Deterministic on any number of threads. Ends early, with pixels left out, when `control` interrupts.
-void estimate_normals(DepthMap& map, int radius, const RunControl& control = {});
+std::vector<float> estimate_normals(DepthMap& map, int radius, const RunControl& control = {});
+
+/// Gives a pixel the normal of the quietest window that holds it, where that is much quieter than its own (or it has
+/// none) and the pixel lies on its plane: a window across an edge averages two surfaces, one beside it sees but one.
+///
+/// @param deviations, radius  as estimate_normals() returned and took them.
+/// Deterministic on any number of threads. Does nothing when `control` interrupts.
+void sharpen_normals(DepthMap& map, const std::vector<float>& deviations, int radius, const RunControl& control = {});
 
 /// Standard deviation of a normal about one axis that a plane fit over a window leaves, radians; lengths in metres.
 double normal_error(double noise, double pixel_size, int radius);

@@ -142,6 +142,47 @@ TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   for (const SurfacePoint& pixel : sparse.pixels) EXPECT_TRUE(pixel.normal.isZero());
 }
 
+/// Pixels of a convex roof, both sides towards the sensor, whose normal is more than 8 degrees off both sides'.
+int count_off_both_sides(const DepthMap& map, const testing::PlacedMesh& roof) {
+  const Eigen::Matrix3f R = (map.T_scene_view.linear().transpose() * roof.T_scene_mesh.linear()).cast<float>();
+  int off = 0;
+  for (const SurfacePoint& pixel : map.pixels) {
+    if (pixel.normal.isZero()) continue;
+    const double least = std::min(angle_degrees(pixel.normal, R * -Vector3f::UnitZ()),
+                                  angle_degrees(pixel.normal, R * Vector3f::UnitX()));
+    off += static_cast<int>(least > 8);
+  }
+  return off;
+}
+
+TEST(Normals, OnceSharpenedBelongToOneSideOfAnEdge) {
+  testing::PlacedMesh roof = placed(testing::box({0.1F, 0.1F, 0.1F}), {0, 0, 0});
+  roof.T_scene_mesh = Eigen::Translation3d(0, 0, 0.5) * Eigen::AngleAxisd(45 * kDegree, Eigen::Vector3d::UnitY());
+  for (const double noise : {0.0, 5e-5}) {
+    for (const int radius : {1, 2}) {
+      DepthMap map = map_of({&roof, 1}, std::nullopt, noise);
+      const std::vector<float> deviations = estimate_normals(map, radius);
+      const int before = count_off_both_sides(map, roof);
+      sharpen_normals(map, deviations, radius);
+      EXPECT_GT(before, 80) << "radius " << radius;
+      EXPECT_LT(count_off_both_sides(map, roof), before / 5) << "radius " << radius << ", noise " << noise;
+    }
+  }
+}
+
+TEST(Normals, OnceSharpenedStayOnACurvedSurface) {
+  const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
+  DepthMap map = map_of({&ball, 1}, std::nullopt);
+  const std::vector<float> deviations = estimate_normals(map, 1);
+  sharpen_normals(map, deviations, 1);
+  const Vector3f centre = (map.T_scene_view.inverse() * Eigen::Vector3d(0, 0, 0.5)).cast<float>();
+  for (const SurfacePoint& pixel : map.pixels) {
+    const Vector3f radial = (pixel.position - centre).normalized();
+    if (pixel.normal.isZero() || radial.z() > -0.5F) continue;
+    EXPECT_LT(angle_degrees(pixel.normal, radial), 8);
+  }
+}
+
 TEST(Normals, TellTheNoiseOfTheSensor) {
   const testing::PlacedMesh block = placed(testing::box({0.08F, 0.08F, 0.05F}), {0, 0, 0.45}, 20);
   EXPECT_LT(map_of({&block, 1}, 0.5).noise, 1e-5F);
@@ -161,10 +202,11 @@ TEST(Normals, ErrFromAWindowAsLeastSquaresOverItsOffsets) {
 
 TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
-  const DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
+  DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
+  sharpen_normals(one, estimate_normals(one, 1), 1);
   for (const int threads : {2, 4}) {
     DepthMap many = one;
-    estimate_normals(many, 1, {.threads = threads});
+    sharpen_normals(many, estimate_normals(many, 1, {.threads = threads}), 1, {.threads = threads});
     for (std::size_t i = 0; i < one.pixels.size(); ++i) ASSERT_EQ(many.pixels[i].normal, one.pixels[i].normal) << i;
   }
 }
