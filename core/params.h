@@ -62,9 +62,10 @@ struct DetectParams {
   /// where that is below 1. A bin that holds a part nearly always shows one of them well; where all poses are doubtful,
   /// the part is not there.
   double presence_score = 0.4;
-  int max_results = 100;                   ///< [1, 1000]
-  int max_rejected = 0;                    ///< best poses that scored too little, answered apart, [0, 1000]
-  double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
+  int max_results = 100;  ///< [1, 1000]
+  int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]
+  /// Share of the down-sampled points (of 1500 where there are fewer) that pairs start from, [0.001, 1].
+  double start_point_share = 0.2;
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
   SearchSpace space;              ///< what is known of where parts are

@@ -27,7 +27,7 @@ struct Candidate {
   float score() const { return evidence.score() * confidence; }
   /// How surely the part is there: the score, less where less shows of it than of the part on average. Edges alone are
   /// weak proof: the rim of a bin resembles many a part seen edge-on.
-  float presence() const { return score() * std::min(1.0F, evidence.area); }
+  float presence() const { return evidence.strict_score() * confidence * std::min(1.0F, evidence.area); }
 };
 
 /// Candidates without doubles, best first.

@@ -18,6 +18,7 @@ namespace {
 
 // Lengths as shares of the diameter D.
 constexpr double kRelativeBlock = 0.042;
+constexpr double kFewPoints = 1500;  // the share of the start points is of so many at least
 constexpr float kClusterRadius = 0.06F;
 constexpr float kCoarseTolerance = 0.04F;
 constexpr float kFinalTolerance = 0.006F;
@@ -66,7 +67,9 @@ Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams&
                     DetectStats& stats) {
   const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * model.diameter / map.pixel_size)));
   const ScenePoints scene = down_sample(map, block);
-  const std::vector<int> starts = start_points(scene, params.start_point_share);
+  // Of few points a larger share.
+  const double share = params.start_point_share * std::max(1.0, kFewPoints / static_cast<double>(scene.points.size()));
+  const std::vector<int> starts = start_points(scene, share);
   stats.start_point_count += starts.size();
   return vote(scene, starts, map, model, params, control);
 }

@@ -21,6 +21,8 @@ constexpr float kRelativeFloor = 0.002F;
 /// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
 /// may all be hidden.
 constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;
+/// Pixels up to which outlines are judged in full, diameters.
+constexpr float kFinePixel = 0.021F;
 /// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
 constexpr float kSteepest = 0.25882F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
@@ -159,10 +161,10 @@ constexpr std::size_t kAlignedPoints = 500;
 
 }  // namespace
 
-float Evidence::score() const {
+float Evidence::score_with_outline(float weight) const {
   const float surface = (explained - kViolationPenalty * violated) / (1 - kExcuse * occluded);
   const float right = outline_confirmed + kOutlineTrust, wrong = kOutlinePenalty * outline_contradicted + kOutlineDoubt;
-  const float outline = right / (right + wrong);
+  const float outline = std::pow(right / (right + wrong), weight);
   const float fit = std::exp(-kMisfitPenalty * std::max(0.0F, relative_residual - 1));
   const float size = std::pow(std::min(1.0F, area / kLargeArea), kSizeExponent);
   return std::clamp(surface * outline * fit * size, 0.0F, 1.0F);
@@ -201,6 +203,8 @@ Evidence verify(const DepthMap& map, const Model& model, const Eigen::Isometry3f
   Evidence evidence = compare_surface(map, model, {visible.data(), count}, T_view_model, options, owner);
   evidence.relative_residual =
       evidence.residual / std::max(map.noise, kRelativeFloor * static_cast<float>(model.diameter));
+  const float fineness = std::min(1.0F, kFinePixel * static_cast<float>(model.diameter) / map.pixel_size);
+  evidence.outline_weight = fineness * fineness;
   evidence.area = evidence.explained * model.view_area[viewpoint];
   check_outline(map, model.outlines[viewpoint], T_view_model, options, evidence);
   return evidence;

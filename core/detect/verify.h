@@ -23,6 +23,7 @@ struct Evidence {
   float unexplained = 0;           ///< measured near, with another normal
   float outline_confirmed = 0;     ///< of the outline points: the surface is there and ends, or is not measured beyond
   float outline_contradicted = 0;  ///< of the outline points: the surface goes on, or is missing
+  float outline_weight = 1;        ///< below 1 where the pixels are too coarse to tell where an outline runs
   float area = 0;                  ///< of the explained surface across the view, over the part's mean over all views
   float residual = 0;              ///< root mean square distance of the explained points, metres
   float relative_residual = 0;     ///< over what the sensor's noise explains
@@ -31,10 +32,15 @@ struct Evidence {
   /// in part; times the share of the outline that is where it should be; less where the surface fits worse than noise
   /// explains, or where so little of it is seen that chance may have made it. The weights were fitted on which poses of
   /// simulated bins are right.
-  float score() const;
+  float score() const { return score_with_outline(outline_weight); }
+  /// The same as if the pixels were fine: in doubt, a surface without the outline is no proof.
+  float strict_score() const { return score_with_outline(1); }
   /// Ranks poses that are not refined yet. So far off, most of them contradict the scene enough that their score is 0;
   /// this goes on telling them apart.
   float promise() const;
+
+ private:
+  float score_with_outline(float weight) const;
 };
 
 /// The paper's alignment error as a score [section IV 5]: one less the mean distance of all model points, whether the

@@ -54,6 +54,7 @@ struct SensorView {
   std::vector<Eigen::Vector3f> normals;  ///< of the points, or empty
   float median_depth = 0;                ///< metres
   float spacing = 0;                     ///< typical distance of neighbouring points across the view, metres
+  bool is_grid = false;                  ///< an image's points, row by row; else scattered
 };
 
 /// Errors: INVALID_ARGUMENT when width x height does not fit the points, when no point is finite, or when none lies in

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 
+#include "core/train/sample_surface.h"
 #include "core/train/train.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
@@ -122,6 +124,35 @@ TEST(Detect, DoesNotNeedTheOrderOfThePoints) {
     }
     EXPECT_EQ(same, 1);
   }
+}
+
+TEST(Detect, FindsAPartInACloudOfAllItsSides) {
+  const Model model = testing::quick_model(testing::l_block());
+  const double spacing = 0.01 * model.diameter;
+  const std::vector<SurfacePoint> surface = thin_evenly(scatter(testing::l_block(), spacing / 4), spacing);
+  for (const testing::PlacedMesh& block : four_blocks()) {
+    PointCloud cloud;
+    for (const SurfacePoint& point : surface) {
+      cloud.points.emplace_back((block.T_scene_mesh * point.position.cast<double>()).cast<float>());
+    }
+    cloud.width = static_cast<std::uint32_t>(cloud.points.size());
+    cloud.height = 1;
+    const DetectResult result = *search(cloud, model);
+    ASSERT_FALSE(result.hypotheses.empty());
+    EXPECT_TRUE(right(result.hypotheses.front(), block.T_scene_mesh, model));
+  }
+}
+
+TEST(Detect, FindsAPartInACoarseScan) {
+  const Model model = testing::quick_model(testing::l_block());
+  const testing::PlacedMesh part = {testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {-0.02, -0.03, 0.45})};
+  testing::PinholeSensor coarse;
+  coarse.width = 96;
+  coarse.height = 72;
+  coarse.focal = 0.45 / (0.025 * model.diameter);
+  const DetectResult result = *search(testing::render({&part, 1}, coarse), model);
+  ASSERT_FALSE(result.hypotheses.empty());
+  EXPECT_TRUE(right(result.hypotheses.front(), part.T_scene_mesh, model));
 }
 
 TEST(Detect, FindsNothingOnABareFloor) {

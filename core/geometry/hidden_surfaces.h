@@ -1,0 +1,15 @@
+#pragma once
+
+#include "core/geometry/depth_map.h"
+
+namespace binpose {
+
+/// Share of the points that lie clearly behind the map's point on their ray. One sensor sees next to none; a cloud
+/// merged from several views, or taken from all sides of a part, holds many.
+double hidden_share(const SensorView& view, const DepthMap& map);
+
+/// Takes away what shows through gaps of a nearer surface: a pixel clearly behind the morphological closing (3 x 3) of
+/// the map's nearness, which bridges gaps of less than three pixels and leaves planes as they are.
+void hide_behind_gaps(DepthMap& map);
+
+}  // namespace binpose
