@@ -57,9 +57,14 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
 }
 
 void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
-  std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
-    return (a.evidence.*merit)() > (b.evidence.*merit)();
-  });
+  std::vector<std::pair<float, std::size_t>> order;  // negative: best first
+  order.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) order.emplace_back(-(candidate.evidence.*merit)(), order.size());
+  std::sort(order.begin(), order.end());
+  std::vector<Candidate> sorted;
+  sorted.reserve(candidates.size());
+  for (const auto& [merit_below_0, i] : order) sorted.push_back(std::move(candidates[i]));
+  candidates = std::move(sorted);
 }
 
 Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
