@@ -62,9 +62,10 @@ struct DetectParams {
   /// where that is below 1. A bin that holds a part nearly always shows one of them well; where all poses are doubtful,
   /// the part is not there.
   double presence_score = 0.4;
-  int max_results = 100;                   ///< [1, 1000]
-  int max_rejected = 0;                    ///< best poses that scored too little, answered apart, [0, 1000]
-  double start_point_share = 0.2;          ///< share of the down-sampled points that pairs start from, [0.001, 1]
+  int max_results = 100;  ///< [1, 1000]
+  int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]
+  /// Share of the down-sampled points that pairs start from, [0.001, 1]; five times the share of contour points.
+  double start_point_share = 0.2;
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
   SearchSpace space;              ///< what is known of where parts are
@@ -73,12 +74,13 @@ struct DetectParams {
   std::optional<Eigen::Quaterniond> reference_orientation;
 
   // Effort.
-  int cluster_limit = 1000;     ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
+  int cluster_limit = 700;      ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
   int clusters_per_place = 20;  ///< of those at most so many within a neighbourhood, [1, 1000]
+  double least_promise = 0.5;   ///< Evidence::promise() of a pose that is refined, [-2, 2]
   int refine_limit = 200;       ///< poses that are refined, per source, [1, 100000]
   int refined_per_place = 5;    ///< [1, 1000]
   int finalist_limit = 150;     ///< of those, poses that are refined to the end, [1, 100000]
-  int finalists_per_place = 6;  ///< [1, 1000]
+  int finalists_per_place = 4;  ///< [1, 1000]
 
   // Method.
   bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement

@@ -8,6 +8,6 @@ namespace binpose {
 ///
 /// Finds parts of which only a flat side shows: there all vector pairs look alike, but the rim does not.
 /// Deterministic on any number of threads. Ends early when `control` interrupts.
-Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& control);
+Votes contour_votes(const DepthMap& map, const Model& model, double start_share, const RunControl& control);
 
 }  // namespace binpose

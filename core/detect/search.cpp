@@ -27,15 +27,18 @@ constexpr float kLastGate = 0.025F;
 
 constexpr int kCoarsePoints = 80;
 constexpr int kCoarseOutlineStride = 3;
-constexpr int kFirstIterations = 4;
+constexpr int kFirstIterations = 3;
 constexpr int kFirstPoints = 100;
 constexpr int kFirstOutlineStride = 3;
 constexpr int kMiddlePoints = 300;
 constexpr float kRepeat = 0.02F;
+/// Share of the least score without which no pose is refined to the end: so much that gains almost never.
+constexpr double kHopeful = 1.0 / 6;
 constexpr float kFinestGate = 0.015F;
 constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
 constexpr float kAlignmentCutoff = 0.1F;
+constexpr double kContourStarts = 5;          // as many contour points start pairs, by share, as surface points do
 constexpr double kVotedAngle = 25 * kDegree;  // that a pose made of votes may be off
 
 // Of the time left before a deadline: votes that nobody has the time to verify are worth nothing.
@@ -117,6 +120,7 @@ std::vector<Candidate> stand_coarsely(std::vector<Candidate> candidates, const D
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
+  std::erase_if(candidates, [&](const Candidate& c) { return c.evidence.promise() < params.least_promise; });
   sort_by(&Evidence::promise, candidates);
   return first_of_each_place(candidates, model, params.refined_per_place, params.refine_limit, 0);
 }
@@ -175,6 +179,7 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
+  std::erase_if(candidates, [&](const Candidate& c) { return c.evidence.score() < kHopeful * params.min_score; });
   sort_by(&Evidence::score, candidates);
   candidates =
       first_of_each_place(candidates, model, params.finalists_per_place, params.finalist_limit, kRepeat * diameter);
@@ -224,7 +229,7 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
     const RunControl first = control.with_share_of_time(kSurfaceVotesShare);
     sources[0] = surface_votes(map, model, params, first, stats);
     const RunControl second = control.with_share_of_time(kContourVotesShare);
-    if (params.use_contours) sources[1] = contour_votes(map, model, second);
+    if (params.use_contours) sources[1] = contour_votes(map, model, kContourStarts * params.start_point_share, second);
     if (first.past_deadline() || second.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   }
   if (control.stop.stop_requested()) return {};
