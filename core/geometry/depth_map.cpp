@@ -14,6 +14,7 @@ constexpr double kMostPixels = 4e6;
 constexpr float kWidestTangent = 3;
 constexpr std::size_t kEnoughForDirection = 20000;  // points
 constexpr std::size_t kEnoughForDepth = 10000;
+constexpr std::size_t kPointsPerTask = 8192;
 
 absl::Status check_cloud(const PointCloud& cloud) {
   const std::size_t count = static_cast<std::size_t>(cloud.width) * cloud.height;
@@ -140,16 +141,22 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction.normalized()).toRotationMatrix();
   view.T_scene_view.translation() = cloud.sensor_position;
   const Eigen::Matrix3f R_view_scene = view.T_scene_view.linear().transpose().cast<float>();
-  view.points.reserve(cloud.points.size());
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    if (i % 1024 == 0 && control.stop.stop_requested()) return control.status();
+  view.points.resize(cloud.points.size());
+  parallel_for_blocks(cloud.points.size(), kPointsPerTask, control.threads, [&](std::size_t i) {
+    if (control.stop.stop_requested()) return;
     const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
-    if (!p.allFinite() || !(p.z() > 1e-6F) || std::max(std::abs(p.x()), std::abs(p.y())) > kWidestTangent * p.z()) {
-      continue;
-    }
-    view.points.push_back(p);
+    const bool seen =
+        p.allFinite() && p.z() > 1e-6F && std::max(std::abs(p.x()), std::abs(p.y())) <= kWidestTangent * p.z();
+    view.points[i] = seen ? p : Eigen::Vector3f(0, 0, 0);
+  });
+  if (control.stop.stop_requested()) return control.status();
+  std::size_t seen_count = 0;
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (!(view.points[i].z() > 0)) continue;
+    view.points[seen_count++] = view.points[i];
     if (!cloud.normals.empty()) view.normals.emplace_back(R_view_scene * cloud.normals[i]);
   }
+  view.points.resize(seen_count);
   if (view.points.empty()) {
     return absl::InvalidArgumentError(
         absl::StrFormat("cloud has no point in front of the sensor at (%g, %g, %g) m; set sensor_position to where it "
