@@ -64,7 +64,8 @@ struct DetectParams {
   double presence_score = 0.4;
   int max_results = 100;  ///< [1, 1000]
   int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]
-  /// Share of the down-sampled points (of 1500 where there are fewer) that pairs start from, [0.001, 1].
+  /// Share of the down-sampled points (of 1500 where there are fewer) that pairs start from, [0.001, 1]; five times the
+  /// share of contour points.
   double start_point_share = 0.2;
   double normal_tolerance = 10 * kDegree;  ///< gate on pair normals, [2, 180] degrees; 180 = none
   bool remove_support_plane = true;
@@ -74,12 +75,13 @@ struct DetectParams {
   std::optional<Eigen::Quaterniond> reference_orientation;
 
   // Effort.
-  int cluster_limit = 1000;     ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
+  int cluster_limit = 700;      ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
   int clusters_per_place = 20;  ///< of those at most so many within a neighbourhood, [1, 1000]
+  double least_promise = 0.5;   ///< Evidence::promise() of a pose that is refined, [-2, 2]
   int refine_limit = 200;       ///< poses that are refined, per source, [1, 100000]
   int refined_per_place = 5;    ///< [1, 1000]
   int finalist_limit = 150;     ///< of those, poses that are refined to the end, [1, 100000]
-  int finalists_per_place = 6;  ///< [1, 1000]
+  int finalists_per_place = 4;  ///< [1, 1000]
 
   // Method.
   bool use_contours = true;  ///< contour pairs find poses, and rims hold them in refinement

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 
 #include "core/detect/thin_clusters.h"
 #include "core/parallel.h"
@@ -123,6 +124,22 @@ std::vector<Cell> sum_by_cell(std::span<const PoseVote> votes, const CellOf& cel
   return cells;
 }
 
+/// The cells of most weight, at most `most`, heaviest first; equal ones in their order.
+std::vector<std::uint32_t> heaviest(const std::vector<Cell>& cells, std::size_t most) {
+  std::vector<std::pair<float, std::uint32_t>> weights;  // negative: heaviest first
+  weights.reserve(cells.size());
+  for (const Cell& cell : cells) weights.emplace_back(-cell.weight, static_cast<std::uint32_t>(weights.size()));
+  if (most < weights.size()) {
+    std::nth_element(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(most), weights.end());
+    weights.resize(most);
+  }
+  std::sort(weights.begin(), weights.end());
+  std::vector<std::uint32_t> indices;
+  indices.reserve(weights.size());
+  for (const auto& [weight, index] : weights) indices.push_back(index);
+  return indices;
+}
+
 PoseCluster mean(const Cell& cell) {
   return {cell.centre / cell.weight, Eigen::Quaternionf(Eigen::Vector4f(cell.quaternion.normalized())), cell.weight};
 }
@@ -204,17 +221,11 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   const std::vector<Cell> cells = sum_by_cell(votes, cell_of, control);
   if (control.stop.stop_requested()) return {};
 
-  std::vector<std::uint32_t> seeds(cells.size());
-  std::iota(seeds.begin(), seeds.end(), 0);
-  const std::size_t seed_count = std::min<std::size_t>(seeds.size(), 2 * static_cast<std::size_t>(options.most));
-  std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(seed_count), seeds.end(),
-                    [&](std::uint32_t a, std::uint32_t b) {
-                      return cells[a].weight != cells[b].weight ? cells[a].weight > cells[b].weight : a < b;
-                    });
+  const std::vector<std::uint32_t> seeds = heaviest(cells, 2 * static_cast<std::size_t>(options.most));
   const PoseCellIndex index(cells);
   const SamePose same_pose(options);
-  std::vector<PoseCluster> merged(seed_count);
-  parallel_for_blocks(seed_count, kSeedsPerTask, control.threads, [&](std::size_t i) {
+  std::vector<PoseCluster> merged(seeds.size());
+  parallel_for_blocks(seeds.size(), kSeedsPerTask, control.threads, [&](std::size_t i) {
     if (!control.stop.stop_requested()) merged[i] = with_neighbours(cells, index, seeds[i], cell_of, same_pose);
   });
   if (control.stop.stop_requested()) return {};

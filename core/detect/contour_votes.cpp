@@ -1,6 +1,7 @@
 #include "core/detect/contour_votes.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/detect/point_block.h"
 #include "core/parallel.h"
@@ -10,6 +11,7 @@ namespace {
 
 constexpr int kBlock = 4;  // pixels: one contour point of each block takes part
 constexpr int kPointsPerTask = 64;
+constexpr double kGoldenRatio = 0.6180339887498949;
 
 /// The scene's contour points thinned by image block, row by row, their outward directions turned into the tangent
 /// plane.
@@ -101,7 +103,7 @@ void match_point(const ContourGrid& grid, int a, int reach, const Model& model, 
 
 }  // namespace
 
-Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& control) {
+Votes contour_votes(const DepthMap& map, const Model& model, double start_share, const RunControl& control) {
   const ContourGrid grid(map);
   const int count = static_cast<int>(grid.points.size());
   const int tasks = (count + kPointsPerTask - 1) / kPointsPerTask;
@@ -110,6 +112,7 @@ Votes contour_votes(const DepthMap& map, const Model& model, const RunControl& c
     std::vector<int> partners;
     for (int a = task * kPointsPerTask; a < std::min(count, (task + 1) * kPointsPerTask); ++a) {
       if (control.interrupted()) return;
+      if (std::fmod(kGoldenRatio * a, 1.0) >= start_share) continue;  // any stretch of the list holds its share
       const double span = kLongestContourPair * model.diameter;
       const double pixels = span * map.focal / std::max(1e-6, grid.points[a].position.z() - span);
       match_point(grid, a, static_cast<int>(std::min(pixels / kBlock, 1e6)) + 1, model, partners, parts[task]);

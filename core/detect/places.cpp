@@ -3,10 +3,12 @@
 namespace binpose {
 namespace {
 
-/// Whether two poses are turned alike, but for what refinement leaves.
-bool same_turn(const Candidate& a, const Candidate& b) {
-  constexpr float kLeastTrace = 2.985F;  // 7 degrees
-  return a.T_view_model.linear().cwiseProduct(b.T_view_model.linear()).sum() > kLeastTrace;
+/// Whether two poses are turned so that they show the same, but for what refinement leaves.
+bool same_turn(const Candidate& a, const Candidate& b, const Symmetry& symmetry) {
+  constexpr double kLeastTrace = 2.985;  // 7 degrees
+  const Eigen::Matrix3d R_a_view = a.T_view_model.linear().transpose().cast<double>();
+  const Pose nearest = best_equivalent(Pose(b.T_view_model.cast<double>()), symmetry, R_a_view);
+  return (R_a_view * nearest.linear()).trace() > kLeastTrace;
 }
 
 }  // namespace
@@ -25,7 +27,7 @@ std::vector<Candidate> first_of_each_place(const std::vector<Candidate>& candida
     for (std::size_t i = 0; i < kept.size() && !repeats; ++i) {
       const float sq_distance = (places[i] - place).squaredNorm();
       around += static_cast<int>(sq_distance < reach * reach);
-      repeats = sq_distance < repeat * repeat && same_turn(candidate, kept[i]);
+      repeats = sq_distance < repeat * repeat && same_turn(kept[i], candidate, model.symmetry);
     }
     if (repeats || around >= per_place) continue;
     kept.push_back(candidate);

@@ -27,7 +27,8 @@ void own_pixels(const DepthMap& map, const Model& model, const Candidate& candid
     for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
       for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
         const int i = row * map.width + column;
-        if (map.measured(i) && std::abs(normal.dot(map.pixels[i].position - p)) <= tolerance) owner[i] = index;
+        if (owner[i] == index || !map.measured(i)) continue;
+        if (std::abs(normal.dot(map.pixels[i].position - p)) <= tolerance) owner[i] = index;
       }
     }
   }

@@ -28,15 +28,18 @@ constexpr float kLastGate = 0.025F;
 
 constexpr int kCoarsePoints = 80;
 constexpr int kCoarseOutlineStride = 3;
-constexpr int kFirstIterations = 4;
+constexpr int kFirstIterations = 3;
 constexpr int kFirstPoints = 100;
 constexpr int kFirstOutlineStride = 3;
 constexpr int kMiddlePoints = 300;
 constexpr float kRepeat = 0.02F;
+/// Share of the least score without which no pose is refined to the end: so much that gains almost never.
+constexpr double kHopeful = 1.0 / 6;
 constexpr float kFinestGate = 0.015F;
 constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
 constexpr float kAlignmentCutoff = 0.1F;
+constexpr double kContourStarts = 5;          // as many contour points start pairs, by share, as surface points do
 constexpr double kVotedAngle = 25 * kDegree;  // that a pose made of votes may be off
 
 // Of the time left before a deadline: votes that nobody has the time to verify are worth nothing.
@@ -58,9 +61,14 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
 }
 
 void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
-  std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
-    return (a.evidence.*merit)() > (b.evidence.*merit)();
-  });
+  std::vector<std::pair<float, std::size_t>> order;  // negative: best first
+  order.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) order.emplace_back(-(candidate.evidence.*merit)(), order.size());
+  std::sort(order.begin(), order.end());
+  std::vector<Candidate> sorted;
+  sorted.reserve(candidates.size());
+  for (const auto& [merit_below_0, i] : order) sorted.push_back(std::move(candidates[i]));
+  candidates = std::move(sorted);
 }
 
 Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
@@ -115,6 +123,7 @@ std::vector<Candidate> stand_coarsely(std::vector<Candidate> candidates, const D
   coarse.most_points = kCoarsePoints;
   coarse.outline_stride = kCoarseOutlineStride;
   verify_all(map, model, coarse, control, candidates);
+  std::erase_if(candidates, [&](const Candidate& c) { return c.evidence.promise() < params.least_promise; });
   sort_by(&Evidence::promise, candidates);
   return first_of_each_place(candidates, model, params.refined_per_place, params.refine_limit, 0);
 }
@@ -173,6 +182,7 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   VerifyOptions verification = final_verification(map, model);
   verification.most_points = kMiddlePoints;
   refine_all(map, model, refinement, verification, control, candidates, stats);
+  std::erase_if(candidates, [&](const Candidate& c) { return c.evidence.score() < kHopeful * params.min_score; });
   sort_by(&Evidence::score, candidates);
   candidates =
       first_of_each_place(candidates, model, params.finalists_per_place, params.finalist_limit, kRepeat * diameter);
@@ -222,7 +232,7 @@ std::vector<Candidate> search(const DepthMap& map, const Model& model, int model
     const RunControl first = control.with_share_of_time(kSurfaceVotesShare);
     sources[0] = surface_votes(map, model, params, first, stats);
     const RunControl second = control.with_share_of_time(kContourVotesShare);
-    if (params.use_contours) sources[1] = contour_votes(map, model, second);
+    if (params.use_contours) sources[1] = contour_votes(map, model, kContourStarts * params.start_point_share, second);
     if (first.past_deadline() || second.past_deadline()) stats.stop_reason = StopReason::kDeadline;
   }
   if (control.stop.stop_requested()) return {};

@@ -20,34 +20,37 @@ struct ViewPlane {
   float offset;            // normal . point
 };
 
-/// Every n-th pixel with a normal, so that about `count` are taken.
-std::vector<int> evenly_taken(const DepthMap& map, int count) {
-  std::vector<int> with_normal;
+std::vector<int> pixels_with_normal(const DepthMap& map) {
+  std::vector<int> pixels;
   for (int i = 0; i < static_cast<int>(map.pixels.size()); ++i) {
-    if (map.has_normal(i)) with_normal.push_back(i);
+    if (map.has_normal(i)) pixels.push_back(i);
   }
-  std::vector<int> taken;
-  const int available = static_cast<int>(with_normal.size());
+  return pixels;
+}
+
+/// Every n-th of some pixels, so that about `count` are taken.
+std::vector<SurfacePoint> evenly_taken(const DepthMap& map, const std::vector<int>& pixels, int count) {
+  std::vector<SurfacePoint> taken;
+  const int available = static_cast<int>(pixels.size());
   const int most = std::min(count, available);
   taken.reserve(most);
-  for (int i = 0; i < most; ++i) taken.push_back(with_normal[static_cast<std::int64_t>(i) * available / most]);
+  for (int i = 0; i < most; ++i) taken.push_back(map.pixels[pixels[static_cast<std::int64_t>(i) * available / most]]);
   return taken;
 }
 
-bool on_plane(const DepthMap& map, int i, const ViewPlane& plane, float tolerance) {
-  return std::abs(plane.normal.dot(map.pixels[i].position) - plane.offset) <= tolerance &&
-         plane.normal.dot(map.pixels[i].normal) >= kSameNormalCosine;
+bool on_plane(const SurfacePoint& point, const ViewPlane& plane, float tolerance) {
+  return std::abs(plane.normal.dot(point.position) - plane.offset) <= tolerance &&
+         plane.normal.dot(point.normal) >= kSameNormalCosine;
 }
 
 /// Least-squares plane through the probes that lie on a plane.
-ViewPlane refit(const DepthMap& map, const std::vector<int>& probes, const ViewPlane& plane, float tolerance,
-                float& extent) {
+ViewPlane refit(const std::vector<SurfacePoint>& probes, const ViewPlane& plane, float tolerance, float& extent) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   int count = 0;
-  for (const int i : probes) {
-    if (!on_plane(map, i, plane, tolerance)) continue;
-    const Eigen::Vector3d p = map.pixels[i].position.cast<double>();
+  for (const SurfacePoint& probe : probes) {
+    if (!on_plane(probe, plane, tolerance)) continue;
+    const Eigen::Vector3d p = probe.position.cast<double>();
     sum += p;
     squares += p * p.transpose();
     ++count;
@@ -63,20 +66,22 @@ ViewPlane refit(const DepthMap& map, const std::vector<int>& probes, const ViewP
 
 /// The seed plane that holds most probes among those with next to nothing behind them.
 std::optional<ViewPlane> find_plane(const DepthMap& map, float diameter, float tolerance) {
-  const std::vector<int> probes = evenly_taken(map, kProbes);
+  const std::vector<int> pixels = pixels_with_normal(map);
+  const std::vector<SurfacePoint> probes = evenly_taken(map, pixels, kProbes);
+  const double most_behind = kMostBehind * static_cast<double>(probes.size());
   std::optional<ViewPlane> best;
   auto most = static_cast<int>(kLeastShare * static_cast<double>(probes.size()));
-  for (const int seed : evenly_taken(map, kSeeds)) {
-    const SurfacePoint& at = map.pixels[seed];
-    const ViewPlane plane{at.normal, at.normal.dot(at.position)};
+  for (const SurfacePoint& seed : evenly_taken(map, pixels, kSeeds)) {
+    const ViewPlane plane{seed.normal, seed.normal.dot(seed.position)};
     int on = 0, behind = 0;
-    for (const int i : probes) {
-      on += on_plane(map, i, plane, 2 * tolerance);
-      behind += plane.normal.dot(map.pixels[i].position) < plane.offset - 4 * tolerance;
+    for (const SurfacePoint& probe : probes) {
+      on += on_plane(probe, plane, 2 * tolerance);
+      behind += plane.normal.dot(probe.position) < plane.offset - 4 * tolerance;
+      if (behind > most_behind) break;
     }
-    if (on <= most || behind > kMostBehind * static_cast<double>(probes.size())) continue;
+    if (on <= most || behind > most_behind) continue;
     float extent = 0;
-    const ViewPlane fitted = refit(map, probes, plane, 2 * tolerance, extent);
+    const ViewPlane fitted = refit(probes, plane, 2 * tolerance, extent);
     if (extent < kLeastExtent * diameter) continue;
     most = on;
     best = fitted;
@@ -93,7 +98,7 @@ bool mark_support_plane(DepthMap& map, float diameter) {
   const std::optional<ViewPlane> plane = find_plane(map, diameter, tolerance);
   if (!plane) return false;
   for (int i = 0; i < static_cast<int>(map.pixels.size()); ++i) {
-    map.background[i] = map.has_normal(i) && on_plane(map, i, *plane, tolerance) ? 1 : 0;
+    map.background[i] = map.has_normal(i) && on_plane(map.pixels[i], *plane, tolerance) ? 1 : 0;
   }
   return true;
 }

@@ -27,13 +27,11 @@ unsigned agreeing(const PairTable::Block& block, const std::int16_t (&scene)[9],
     }
     agree &= dot >= least;
   }
-  // Most blocks hold no match.
   using Words = std::uint64_t __attribute__((vector_size(2 * PairTable::kBlock)));
-  const auto words = reinterpret_cast<Words>(agree);
-  if ((words[0] | words[1]) == 0) return 0;
-  unsigned bits = 0;
-  for (int lane = 0; lane < PairTable::kBlock; ++lane) bits |= (agree[lane] & 1U) << lane;
-  return bits;
+  const auto words = reinterpret_cast<Words>(agree & NormalLanes{1, 2, 4, 8, 16, 32, 64, 128});
+  std::uint64_t bits = words[0] | words[1];
+  bits |= bits >> 32;
+  return (bits | bits >> 16) & 0xFF;
 }
 
 /// Scene points at a pair's length from P, and the directions to them.

@@ -56,7 +56,7 @@ void find_contours(DepthMap& map, float step, Unmeasured unmeasured, const RunCo
     if (control.interrupted()) return;
     for (int u = 0; u < map.width; ++u) {
       const int i = v * map.width + u;
-      if (!map.has_normal(i)) continue;
+      if (!map.has_normal(i) || map.background[i] != 0) continue;
       const bool inside = u > 0 && v > 0 && u < map.width - 1 && v < map.height - 1;
       if (!inside || !goes_on(map, i, step)) outward[i] = outward_at(map, u, v, step, unmeasured);
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_format.h"
+#include "core/parallel.h"
 
 namespace binpose {
 namespace {
@@ -12,6 +13,8 @@ constexpr double kMostPixels = 4e6;
 /// Points farther than this off the viewing direction are left out: tan 72 degrees.
 constexpr float kWidestTangent = 3;
 constexpr std::size_t kEnoughForDirection = 20000;  // points
+constexpr std::size_t kEnoughForDepth = 10000;
+constexpr std::size_t kPointsPerTask = 8192;
 
 absl::Status check_cloud(const PointCloud& cloud) {
   const std::size_t count = static_cast<std::size_t>(cloud.width) * cloud.height;
@@ -40,30 +43,19 @@ Eigen::Vector3d viewing_direction(const std::vector<Eigen::Vector3f>& points, co
   return direction;
 }
 
-/// The box of x/z and y/z that all points fall into.
-struct Window {
-  float low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
-  explicit Window(const std::vector<Eigen::Vector3f>& points) {
-    for (const Eigen::Vector3f& p : points) {
-      low_x = std::min(low_x, p.x() / p.z());
-      high_x = std::max(high_x, p.x() / p.z());
-      low_y = std::min(low_y, p.y() / p.z());
-      high_y = std::max(high_y, p.y() / p.z());
-    }
-  }
-};
-
+/// Of every n-th point.
 float median_depth(const std::vector<Eigen::Vector3f>& points) {
-  std::vector<float> depths(points.size());
-  std::transform(points.begin(), points.end(), depths.begin(), [](const Eigen::Vector3f& p) { return p.z(); });
+  const std::size_t step = 1 + points.size() / kEnoughForDepth;
+  std::vector<float> depths;
+  depths.reserve(points.size() / step + 1);
+  for (std::size_t i = 0; i < points.size(); i += step) depths.push_back(points[i].z());
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
   return *middle;
 }
 
 /// Side of a coarse cell over the root of the median count of points in it.
-float point_spacing(const std::vector<Eigen::Vector3f>& points, float depth) {
-  const Window window(points);
+float point_spacing(const std::vector<Eigen::Vector3f>& points, const TangentBox& window, float depth) {
   const float area = std::max((window.high_x - window.low_x) * (window.high_y - window.low_y), 1e-12F);
   const float cell = 5 * std::sqrt(area / static_cast<float>(points.size()));
   const int columns = static_cast<int>((window.high_x - window.low_x) / cell) + 1;
@@ -103,19 +95,34 @@ Eigen::Vector3f between_neighbours(const DepthMap& map, int u, int v) {
 
 /// Scattered points leave single pixels empty that lie on a surface all the same.
 void fill_specks(DepthMap& map, const RunControl& control) {
-  std::vector<std::pair<int, Eigen::Vector3f>> filled;
-  for (int v = 0; v < map.height && !control.interrupted(); ++v) {
+  std::vector<std::vector<std::pair<int, Eigen::Vector3f>>> filled(map.height);
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (control.interrupted()) return;
     for (int u = 0; u < map.width; ++u) {
       const int i = v * map.width + u;
       if (map.measured(i)) continue;
       const Eigen::Vector3f point = between_neighbours(map, u, v);
-      if (point.z() > 0) filled.emplace_back(i, point);
+      if (point.z() > 0) filled[v].emplace_back(i, point);
     }
+  });
+  for (const auto& row : filled) {
+    for (const auto& [i, point] : row) map.pixels[i].position = point;
   }
-  for (const auto& [i, point] : filled) map.pixels[i].position = point;
 }
 
 }  // namespace
+
+TangentBox window_of(const std::vector<Eigen::Vector3f>& points) {
+  TangentBox window;
+  for (const Eigen::Vector3f& p : points) {
+    const float x = p.x() / p.z(), y = p.y() / p.z();
+    window.low_x = std::min(window.low_x, x);
+    window.high_x = std::max(window.high_x, x);
+    window.low_y = std::min(window.low_y, y);
+    window.high_y = std::max(window.high_y, y);
+  }
+  return window;
+}
 
 absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl& control) {
   if (absl::Status status = check_cloud(cloud); !status.ok()) return status;
@@ -135,16 +142,22 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction.normalized()).toRotationMatrix();
   view.T_scene_view.translation() = cloud.sensor_position;
   const Eigen::Matrix3f R_view_scene = view.T_scene_view.linear().transpose().cast<float>();
-  view.points.reserve(cloud.points.size());
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    if (i % 1024 == 0 && control.stop.stop_requested()) return control.status();
+  view.points.resize(cloud.points.size());
+  parallel_for_blocks(cloud.points.size(), kPointsPerTask, control.threads, [&](std::size_t i) {
+    if (control.stop.stop_requested()) return;
     const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
-    if (!p.allFinite() || !(p.z() > 1e-6F) || std::max(std::abs(p.x()), std::abs(p.y())) > kWidestTangent * p.z()) {
-      continue;
-    }
-    view.points.push_back(p);
+    const bool seen =
+        p.allFinite() && p.z() > 1e-6F && std::max(std::abs(p.x()), std::abs(p.y())) <= kWidestTangent * p.z();
+    view.points[i] = seen ? p : Eigen::Vector3f(0, 0, 0);
+  });
+  if (control.stop.stop_requested()) return control.status();
+  std::size_t seen_count = 0;
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (!(view.points[i].z() > 0)) continue;
+    view.points[seen_count++] = view.points[i];
     if (!cloud.normals.empty()) view.normals.emplace_back(R_view_scene * cloud.normals[i]);
   }
+  view.points.resize(seen_count);
   if (view.points.empty()) {
     return absl::InvalidArgumentError(
         absl::StrFormat("cloud has no point in front of the sensor at (%g, %g, %g) m; set sensor_position to where it "
@@ -152,14 +165,15 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
                         cloud.sensor_position.x(), cloud.sensor_position.y(), cloud.sensor_position.z()));
   }
   if (control.stop.stop_requested()) return control.status();
+  view.window = window_of(view.points);
   view.median_depth = median_depth(view.points);
   if (control.stop.stop_requested()) return control.status();
-  view.spacing = point_spacing(view.points, view.median_depth);
+  view.spacing = point_spacing(view.points, view.window, view.median_depth);
   return view;
 }
 
 DepthMap depth_map(const SensorView& view, double pixel_size, const RunControl& control) {
-  const Window window(view.points);
+  const TangentBox& window = view.window;
   const double width_tan = window.high_x - window.low_x, height_tan = window.high_y - window.low_y;
   double pixel_tan = pixel_size / view.median_depth;
   pixel_tan = std::max({pixel_tan, std::sqrt(width_tan * height_tan / kMostPixels),

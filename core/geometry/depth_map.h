@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -47,11 +48,19 @@ struct DepthMap {
   }
 };
 
+/// The box of x/z and y/z that points fall into.
+struct TangentBox {
+  float low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
+};
+
+TangentBox window_of(const std::vector<Eigen::Vector3f>& points);
+
 /// The measured points of a cloud, seen from its sensor.
 struct SensorView {
   Pose T_scene_view = Pose::Identity();
   std::vector<Eigen::Vector3f> points;   ///< in front of the sensor, view frame
   std::vector<Eigen::Vector3f> normals;  ///< of the points, or empty
+  TangentBox window;                     ///< of the points
   float median_depth = 0;                ///< metres
   float spacing = 0;                     ///< typical distance of neighbouring points across the view, metres
   bool is_grid = false;                  ///< an image's points, row by row; else scattered

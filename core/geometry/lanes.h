@@ -39,12 +39,19 @@ using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< ma
   return sum;
 }
 
-/// Calls `use(lane)` for each of the first `count` lanes that a mask has set.
+/// Bit i is set where lane i of a mask is.
+[[gnu::always_inline]] inline unsigned bits_of(const LaneInts& mask) {
+  using Words = std::uint64_t __attribute__((vector_size(4 * kLanes)));
+  const auto words = reinterpret_cast<Words>(mask & LaneInts{1, 2, 4, 8, 16, 32, 64, 128});
+  const std::uint64_t bits = words[0] | words[1] | words[2] | words[3];
+  return static_cast<unsigned>(bits | bits >> 32);
+}
+
+/// Calls `use(lane)` for each of the first `count` > 0 lanes that a mask has set.
 template <typename Use>
 [[gnu::always_inline]] inline void for_each_set(const LaneInts& mask, int count, Use&& use) {
-  for (int lane = 0; lane < kLanes && lane < count; ++lane) {
-    if (mask[lane] != 0) use(lane);
-  }
+  const unsigned asked = (1U << (count < kLanes ? count : kLanes)) - 1;
+  for (unsigned bits = bits_of(mask) & asked; bits != 0; bits &= bits - 1) use(__builtin_ctz(bits));
 }
 
 /// In a fixed order, whatever the processor.

@@ -25,10 +25,10 @@ struct RayImage {
   std::vector<float> x, y;  ///< tangents of the ray through the point
   std::vector<float> z, w;  ///< depth and inverse depth; 0: nothing measured
 
-  RayImage(const DepthMap& map, int margin) : stride(map.width + 2 * margin + kLanes), margin(margin) {
+  RayImage(const DepthMap& map, int margin, int threads) : stride(map.width + 2 * margin + kLanes), margin(margin) {
     const std::size_t count = static_cast<std::size_t>(stride) * (map.height + 2 * margin);
     for (std::vector<float>* values : {&x, &y, &z, &w}) values->assign(count, 0);
-    for (int v = 0; v < map.height; ++v) {
+    parallel_for(map.height, threads, [&](int v) {
       for (int u = 0; u < map.width; ++u) {
         const Eigen::Vector3f& p = map.pixels[static_cast<std::size_t>(v) * map.width + u].position;
         if (!(p.z() > 0)) continue;
@@ -38,7 +38,7 @@ struct RayImage {
         x[i] = p.x() * w[i];
         y[i] = p.y() * w[i];
       }
-    }
+    });
   }
   std::size_t at(int u, int v) const { return static_cast<std::size_t>(v + margin) * stride + u + margin; }
 };
@@ -187,7 +187,7 @@ double normal_error(double noise, double pixel_size, int radius) {
 
 std::vector<float> estimate_normals(DepthMap& map, int radius, const RunControl& control) {
   Deviations deviations(map.pixels.size());
-  const RayImage rays(map, radius);
+  const RayImage rays(map, radius, control.threads);
   parallel_for(map.height, control.threads, [&](int v) {
     if (!control.interrupted()) fit_row(map, rays, v, radius, deviations);
   });

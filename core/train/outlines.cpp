@@ -45,6 +45,7 @@ std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> de
       view.normals.push_back(cosine > kGrazingCosine ? Eigen::Vector3f(T_view_model.linear() * point.normal)
                                                      : Eigen::Vector3f::Zero());
     }
+    view.window = window_of(view.points);
     DepthMap map = depth_map(view, pixel, control);
     find_contours(map, static_cast<float>(step), Unmeasured::kFar);
     views[k] = std::move(map.contours);

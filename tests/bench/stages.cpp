@@ -102,7 +102,7 @@ void vote_by_surface(State& state, const Bench& bench) {
 
 void vote_by_contour(State& state, const Bench& bench) {
   std::size_t pairs = 0;
-  for (auto _ : state) pairs = contour_votes(bench.map, bench.model, {}).scene_pairs;
+  for (auto _ : state) pairs = contour_votes(bench.map, bench.model, 1, {}).scene_pairs;
   count(state, "pairs", pairs);
 }
 

@@ -27,7 +27,7 @@ struct Scene {
 
 TEST(ContourVotes, FindAPartOfWhichOnlyAFlatSideShows) {
   const Scene scene;
-  const Votes votes = contour_votes(scene.map, scene.model, {});
+  const Votes votes = contour_votes(scene.map, scene.model, 1, {});
   EXPECT_GT(votes.scene_pairs, 100u);
   ClusterOptions options;
   options.radius = static_cast<float>(0.06 * scene.model.diameter);
@@ -77,28 +77,28 @@ TEST(ContourVotes, ComeFromThePairsThatALoopOverAllFinds) {
     }
   }
   EXPECT_GT(pairs, 100U);
-  EXPECT_EQ(contour_votes(scene.map, scene.model, {}).scene_pairs, pairs);
+  EXPECT_EQ(contour_votes(scene.map, scene.model, 1, {}).scene_pairs, pairs);
 }
 
 TEST(ContourVotes, AreNoneWithoutContours) {
   Scene scene;
   scene.map.contours.clear();
-  EXPECT_TRUE(contour_votes(scene.map, scene.model, {}).votes.empty());
+  EXPECT_TRUE(contour_votes(scene.map, scene.model, 1, {}).votes.empty());
 }
 
 TEST(ContourVotes, AreNoneOnTheBackground) {
   Scene scene;
   scene.map.background.assign(scene.map.pixels.size(), 1);
-  EXPECT_TRUE(contour_votes(scene.map, scene.model, {}).votes.empty());
+  EXPECT_TRUE(contour_votes(scene.map, scene.model, 1, {}).votes.empty());
 }
 
 TEST(ContourVotes, AreTheSameOnAnyNumberOfThreads) {
   const Scene scene;
-  const Votes one = contour_votes(scene.map, scene.model, {});
+  const Votes one = contour_votes(scene.map, scene.model, 1, {});
   for (const int threads : {2, 4}) {
     RunControl control;
     control.threads = threads;
-    const Votes many = contour_votes(scene.map, scene.model, control);
+    const Votes many = contour_votes(scene.map, scene.model, 1, control);
     ASSERT_EQ(many.votes.size(), one.votes.size());
     for (std::size_t i = 0; i < one.votes.size(); ++i) ASSERT_EQ(many.votes[i].centre, one.votes[i].centre);
   }

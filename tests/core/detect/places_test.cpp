@@ -40,6 +40,17 @@ TEST(Places, DropWhatRepeatsAnEarlierOneTurnedAlike) {
   EXPECT_EQ(first_of_each_place(candidates, places.model, 10, 100, 0.005F).size(), 3U);
 }
 
+TEST(Places, DropWhatASymmetryOfTheModelMapsOntoAnEarlierOne) {
+  Places places;
+  const std::vector<Candidate> candidates = {places.at(0), places.at(0.01F, 178), places.at(0.01F, 90)};
+  EXPECT_EQ(first_of_each_place(candidates, places.model, 10, 100, 0.02F).size(), 3U);
+  places.model.symmetry.discrete.push_back(
+      turn_about(places.model.centre, Eigen::AngleAxisd(180 * kDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix()));
+  EXPECT_EQ(first_of_each_place(candidates, places.model, 10, 100, 0.02F).size(), 2U);
+  places.model.symmetry.has_axis = true;
+  EXPECT_EQ(first_of_each_place(candidates, places.model, 10, 100, 0.02F).size(), 1U);
+}
+
 TEST(Places, KeepNoMoreThanAskedFor) {
   const Places places;
   EXPECT_EQ(first_of_each_place({places.at(0), places.at(1), places.at(2)}, places.model, 10, 2, 0).size(), 2U);
