@@ -16,7 +16,7 @@ constexpr int kNobody = -1;
 constexpr float kInFront = 0.02F;  // diameters
 constexpr double kTrace = 0.02;    // of the visible surface
 /// Share of a pose's score that another must have to be worth comparing.
-constexpr float kRivalShare = 0.5F;
+constexpr float kRivalShare = 0.6F;
 
 /// Marks the pixels that a pose explains: those around each visible model point that measure the same surface.
 void own_pixels(const DepthMap& map, const Model& model, const Candidate& candidate, float tolerance, int index,

@@ -34,7 +34,9 @@ DetectResult detected(const testing::PartScan& scan) {
   testing::PinholeSensor sensor;
   sensor.noise = 1e-4;
   const Model* models[] = {&scan.model};
-  return *detect(testing::render(scan.bodies, sensor), models, {}, {});
+  DetectParams params;
+  params.presence_score = 0;  // a part alone whose pose is not sure would not be answered
+  return *detect(testing::render(scan.bodies, sensor), models, params, {});
 }
 
 TEST(Rivals, AreThePosesThatShowTheSameFromAPlainSide) {
