@@ -21,7 +21,7 @@ struct PoseHypothesis {
                                  ///< as far as was measured
   double outline_contradicted = 0;  ///< ... the share where it does not, or where there is none
   double explained_area = 0;        ///< explained surface across the view, over the part's mean over all views
-  double confidence = 1;            ///< that this pose is right and not one that shows nearly the same surface
+  double confidence = 1;            ///< that this pose is right and not one that shows nearly the same from this side
   std::vector<Pose> variants;       ///< T_scene_model of nearly alike poses that the scene can't rule out; else empty
   std::vector<Pose> equivalents;    ///< T_scene_model that show the same, where DetectParams::list_equivalents asks
   /// Of a small motion T' = (translation, rotation about the model's origin) * T_scene_model, metres and radians, scene

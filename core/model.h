@@ -24,6 +24,9 @@ inline constexpr double kLargestDiameter = 1e4;
 /// Limit of a model's coordinates and of every other number in it: single precision holds four such, multiplied.
 inline constexpr double kLargestCoordinate = 1e8;
 
+/// Spacing of Model::surface, as a share of the diameter.
+inline constexpr double kRelativeSurfaceSpacing = 0.015;
+
 /// All that training produced; immutable once built and shared between threads. io/model_file.h saves the stored
 /// members; derive() rebuilds the others.
 struct Model {

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "core/detect/rivals.h"
 #include "core/parallel.h"
 
 namespace binpose {
@@ -14,6 +15,8 @@ namespace {
 constexpr int kNobody = -1;
 constexpr float kInFront = 0.02F;  // diameters
 constexpr double kTrace = 0.02;    // of the visible surface
+/// Share of a pose's score that another must have to be worth comparing.
+constexpr float kRivalShare = 0.6F;
 
 /// Marks the pixels that a pose explains: those around each visible model point that measure the same surface.
 void own_pixels(const DepthMap& map, const Model& model, const Candidate& candidate, float tolerance, int index,
@@ -64,6 +67,7 @@ class Line {
         control_(control),
         first_(std::move(candidates)),
         variants_(first_.size()),
+        rivalries_(first_.size()),
         is_absent_(models.size(), false) {
     std::stable_sort(first_.begin(), first_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
@@ -130,7 +134,21 @@ class Line {
     });
   }
 
-  /// Judges the first in line anew; sends it back to its place if it lost pixels to a better one.
+  /// Compares a candidate with all that are nearly as good; others' pixels don't matter.
+  Rivalry rivalry_of(const Candidate& candidate) const {
+    std::vector<Eigen::Isometry3f> others;
+    for (const Candidate& other : first_) {
+      if (other.model_index == candidate.model_index &&
+          other.evidence.score() >= kRivalShare * candidate.evidence.score()) {
+        others.push_back(other.T_view_model);
+      }
+    }
+    return weigh_rivals(map_, *models_[candidate.model_index], candidate.T_view_model, others,
+                        options_.verification[candidate.model_index]);
+  }
+
+  /// Judges the first in line anew; sends it back to its place if it lost pixels to a better one or is less sure
+  /// than it seemed.
   bool stands_firm() {
     const int i = order_[next_];
     Candidate& candidate = candidates_[i];
@@ -142,6 +160,12 @@ class Line {
     candidate.confidence = variants_[i]->confidence;
     candidate.rivals = variants_[i]->rivals;
     candidate.evidence = verify(map_, model, candidate.T_view_model, options, &owner_);
+    // Few get so far: the doubles have lost their pixels.
+    if (!rivalries_[i] && candidate.score() >= before) rivalries_[i] = rivalry_of(candidate);
+    if (rivalries_[i]) {
+      candidate.confidence = 1 / (1 / candidate.confidence + rivalries_[i]->odds);
+      candidate.rivals.insert(candidate.rivals.end(), rivalries_[i]->rivals.begin(), rivalries_[i]->rivals.end());
+    }
     if (candidate.score() >= before) return true;
     const auto first = order_.begin() + static_cast<std::ptrdiff_t>(next_);
     std::rotate(first, first + 1, std::upper_bound(first + 1, order_.end(), i, [&](int a, int b) {
@@ -156,6 +180,7 @@ class Line {
   const RunControl& control_;
   std::vector<Candidate> first_;                        // as they came, best first
   std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen already
+  std::vector<std::optional<Rivalry>> rivalries_;       // the same
   std::vector<bool> is_absent_;                         // per model: none of it is accepted
   std::vector<Candidate> candidates_;                   // as judged so far
   std::vector<int> order_;                              // of the candidates

@@ -20,10 +20,10 @@ struct Candidate {
   float votes = 0;
   Evidence evidence;
   float confidence = 1;                   ///< that the choice is right
-  std::vector<Eigen::Isometry3f> rivals;  ///< T_view_model of nearly alike poses that the scene does not rule out
+  std::vector<Eigen::Isometry3f> rivals;  ///< T_view_model of poses nearly alike from here, not ruled out
   std::vector<int> occluded_by;           ///< indices into the ranked list, ascending; set by rank()
 
-  /// The evidence, times the confidence that none of the nearly alike poses is the right one.
+  /// The evidence, times the confidence that none of the rivals is the right one.
   float score() const { return evidence.score() * confidence; }
   /// How surely the part is there: the score, less where less shows of it than of the part on average. Edges alone are
   /// weak proof: the rim of a bin resembles many a part seen edge-on.

@@ -23,8 +23,6 @@ constexpr float kRelativeFloor = 0.002F;
 constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;
 /// Pixels up to which outlines are judged in full, diameters.
 constexpr float kFinePixel = 0.021F;
-/// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
-constexpr float kSteepest = 0.25882F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.
 constexpr float kOutside = 2.0F;
 constexpr float kInside = 1.0F;

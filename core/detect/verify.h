@@ -7,6 +7,9 @@
 
 namespace binpose {
 
+/// Surface seen under less than this cosine (75 degrees) is left out: sensors often get no echo from it.
+inline constexpr float kSteepest = 0.25882F;
+
 /// How closely scene and model must agree.
 struct VerifyOptions {
   float tolerance = 0;                                ///< metres along the normal

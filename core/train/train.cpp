@@ -17,9 +17,7 @@
 namespace binpose {
 namespace {
 
-/// Spacing of the points that verification and refinement use, as a share of the diameter.
-constexpr double kRelativeSurfaceSpacing = 0.015;
-/// Spacing of the points that stand for the whole surface in projections.
+/// Spacing of the points that stand for the whole surface in projections, as a share of the diameter.
 constexpr double kRelativeDenseSpacing = 0.007;
 constexpr double kRelativeCell = 0.02;
 constexpr double kRelativePixel = 0.014;

@@ -47,15 +47,15 @@ void print(const std::string& name, const Row& row) {
 }
 
 /// One line of a hypothesis for whoever studies what is right and what is wrong.
-void print_hypothesis(const std::string& scene, int verdict, const PoseHypothesis& p) {
+void print_hypothesis(const std::string& scene, int verdict, const PoseHypothesis& p, int variants_right = 0) {
   const Eigen::Vector3d t = p.T_scene_model.translation();
   const Eigen::Quaterniond q(p.T_scene_model.linear());
   std::printf(
       "H %s %d %.3f expl %.3f viol %.3f occl %.3f unex %.3f conf %.3f contr %.3f certain %.3f area %.3f res %.3f "
-      "votes %.2f POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
+      "votes %.2f variants %zu right %d POSE %.5f %.5f %.5f %.5f %.5f %.5f %.5f\n",
       scene.c_str(), verdict, p.score, p.explained_fraction, p.violated_fraction, 1 - p.visible_fraction,
       p.unexplained_fraction, p.outline_confirmed, p.outline_contradicted, p.confidence, p.explained_area,
-      1e3 * p.residual, p.votes, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+      1e3 * p.residual, p.votes, p.variants.size(), variants_right, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
 void add(DetectStats& sum, const DetectStats& s) {
@@ -208,7 +208,10 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
     if (per_scene) print(scene.name, {score, {1000 * result->stats.total_seconds}});
     for (std::size_t h = 0; h < result->hypotheses.size() && dump; ++h) {
       const PoseHypothesis& p = result->hypotheses[h];
-      print_hypothesis(scene.name, verdicts[h], p);
+      int right = 0;
+      for (const Pose& v : p.variants)
+        for (const SceneInstance& i : scene.instances) right += judge.right(v, i.T_scene_model);
+      print_hypothesis(scene.name, verdicts[h], p, right);
     }
     const DetectStats& s = result->stats;
     add(sum, s);
