@@ -8,7 +8,7 @@ run="libabsl20220623 libcivetweb1 libgrpc++1.51 liblzf1 libpng16-16 libprometheu
 build="cmake g++ ninja-build
   libabsl-dev libcivetweb-dev libcli11-dev libeigen3-dev libgrpc++-dev liblzf-dev libpng-dev libprotobuf-dev libspdlog-dev
   libssl-dev libtbb-dev prometheus-cpp-dev protobuf-compiler protobuf-compiler-grpc"
-test="chromium chromium-driver clang clang-format clang-tidy curl fish git haproxy iproute2 libbenchmark-dev
+test="chromium chromium-driver clang clang-format clang-tidy curl docker-compose fish git haproxy iproute2 libbenchmark-dev
   libbullet-dev libclang-rt-14-dev libembree-dev libgmock-dev libgtest-dev libpcl-dev nlohmann-json3-dev openssl
   pkgconf prometheus python3 python3-grpcio python3-matplotlib python3-numpy python3-pil python3-protobuf
   python3-selenium python3-setuptools python3-yaml shellcheck systemd zsh"

@@ -10,7 +10,7 @@ deploy/install-packages.sh test
 cmake --preset dev
 cmake --build "$build"
 
-# The linter of the wire API and the schemas of Kubernetes are npm packages; where npm cannot fetch them, their tests are
+# The linter of the wire API and the schemas of Kubernetes and Grafana are npm packages; where npm cannot fetch them, their tests are
 # skipped and say so.
 if ! cmp -s tests/lint/package.json "$build/package.json"; then
   cp tests/lint/package.json "$build/"

@@ -230,6 +230,21 @@ class LivePrometheusTest(unittest.TestCase):
 
 
 class ComposeTest(unittest.TestCase):
+    def test_it_is_what_compose_takes(self):
+        for change, known in [(("", ""), True), (("ports:", "port:"), False), (("  metrics: {}", ""), False)]:
+            text = (DEPLOY / "compose.yaml").read_text().replace(*change)
+            check = run("docker-compose", "--file", "-", "config", "--quiet", input=text, cwd=DEPLOY)
+            self.assertEqual(check.returncode == 0, known, check.stderr)
+
+    def test_grafana_finds_its_dashboard_and_prometheus(self):
+        services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
+        mounts = dict(volume.split(":")[:2] for volume in services["grafana"]["volumes"])
+        [provider] = yaml.safe_load((DEPLOY / "grafana/provisioning/dashboards/binpose.yaml").read_text())["providers"]
+        self.assertEqual(mounts["./grafana/binpose.json"], f"{provider['options']['path']}/binpose.json")
+        [source] = yaml.safe_load((DEPLOY / "grafana/provisioning/datasources/prometheus.yaml").read_text())["datasources"]
+        host, port = source["url"].removeprefix("http://").split(":")
+        self.assertEqual(services[host]["ports"], [f"127.0.0.1:{port}:{port}"])
+
     def test_what_it_mounts_is_there_and_what_it_names_exists(self):
         compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
         for name, service in compose["services"].items():

@@ -79,6 +79,7 @@ def main():
                if all(path.is_relative_to(ROOT) and not path.is_relative_to(build) for path in sources_of(entry))]
     if not entries:
         sys.exit(f"{build}/compile_commands.json names no source of this project.")
+    entries.sort(key=lambda entry: -len(sources_of(entry)))  # the longest first, so that all cores end together
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         findings = list(pool.map(lambda entry: tidy(build, entry, includes.get(object_of(entry), [])), entries))
     print("".join(findings), end="")

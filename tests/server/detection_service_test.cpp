@@ -225,7 +225,7 @@ v1::PackedPoints& packed(v1::DetectRequest& request, std::uint32_t width, std::u
   return points;
 }
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
 INSTANTIATE_TEST_SUITE_P(
     Of, RefusesFrameTest,
@@ -253,7 +253,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFrame{
             "NoData", [](v1::DetectRequest& r) { r.mutable_cloud()->clear_data(); }, kInvalid, {"cloud has no data"}},
         BadFrame{"ZeroPoints", [](v1::DetectRequest& r) { packed(r, 0, 1, 0); }, kInvalid, {"width 0", "at least 1"}},
-        BadFrame{"OnlyNan", [](v1::DetectRequest& r) { packed(r, 4, 2, kNaN); }, kInvalid, {"cloud"}},
+        BadFrame{"OnlyNan", [](v1::DetectRequest& r) { packed(r, 4, 2, kNoNumber); }, kInvalid, {"cloud"}},
         BadFrame{"TooFewBytes",
                  [](v1::DetectRequest& r) { packed(r, 4, 2, 1).set_width(5); },
                  kInvalid,
@@ -300,7 +300,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFrame{
             "TornPcd", [](v1::DetectRequest& r) { r.mutable_cloud()->set_pcd("# .PCD v0.7\nVERSION"); }, kInvalid, {}},
         BadFrame{"SensorNowhere",
-                 [](v1::DetectRequest& r) { r.mutable_cloud()->mutable_sensor_position()->set_x(kNaN); },
+                 [](v1::DetectRequest& r) { r.mutable_cloud()->mutable_sensor_position()->set_x(kNoNumber); },
                  kInvalid,
                  {"cloud.sensor_position", "1000 m"}},
         BadFrame{"NoTime",
@@ -324,7 +324,7 @@ INSTANTIATE_TEST_SUITE_P(
                  kInvalid,
                  {"max_rejected is 1001", "1000]"}},
         BadFrame{"StartPointShare",
-                 [](v1::DetectRequest& r) { r.mutable_params()->set_start_point_share(kNaN); },
+                 [](v1::DetectRequest& r) { r.mutable_params()->set_start_point_share(kNoNumber); },
                  kInvalid,
                  {"start_point_share"}}),
     [](const auto& test) { return test.param.name; });

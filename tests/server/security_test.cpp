@@ -14,7 +14,7 @@
 namespace binpose::server {
 namespace {
 
-std::string read(const std::filesystem::path& path) {
+std::string read_pem(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -61,7 +61,7 @@ TEST_F(SecurityTest, ANewCertificateIsTakenUpWhileStreamsOfTheOldOneGoOn) {
   make_certificate("server");
   auto server = Server::start(tls_config());
   ASSERT_TRUE(server.ok()) << server.status();
-  const std::string old_ca = read(path() / "server.pem");
+  const std::string old_ca = read_pem(path() / "server.pem");
   const grpc::Status status = list((*server)->address(), {old_ca, "", ""});
   EXPECT_TRUE(status.ok()) << status.error_message();
 
@@ -85,7 +85,7 @@ TEST_F(SecurityTest, ANewCertificateIsTakenUpWhileStreamsOfTheOldOneGoOn) {
   bool taken_up = false;
   for (int i = 0; i < 50 && !taken_up; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    taken_up = list((*server)->address(), {read(path() / "server.pem"), "", ""}).ok();
+    taken_up = list((*server)->address(), {read_pem(path() / "server.pem"), "", ""}).ok();
   }
   EXPECT_TRUE(taken_up);
   EXPECT_TRUE(is_answered("after"));  // ... lives on
@@ -101,9 +101,9 @@ TEST_F(SecurityTest, MutualTlsLetsInOnlyWhoShowsACertificate) {
   config.tls_client_ca = path() / "robot.pem";
   auto server = Server::start(config);
   ASSERT_TRUE(server.ok()) << server.status();
-  const std::string ca = read(path() / "server.pem");
+  const std::string ca = read_pem(path() / "server.pem");
   const auto as = [&](const std::string& name) {
-    return list((*server)->address(), {ca, read(path() / (name + ".key")), read(path() / (name + ".pem"))});
+    return list((*server)->address(), {ca, read_pem(path() / (name + ".key")), read_pem(path() / (name + ".pem"))});
   };
   EXPECT_TRUE(as("robot").ok()) << as("robot").error_message();
   EXPECT_FALSE(as("stranger").ok());

@@ -14,19 +14,19 @@ namespace binpose {
 namespace {
 
 /// A plate flat on the floor: all that shows is one face and its rim.
-struct Scene {
+struct ContourScene {
   Model model = testing::quick_model(testing::l_block());
   Pose T_scene_model = testing::pose(30, Eigen::Vector3d::UnitZ(), {-0.02, -0.02, 0.4875});
   DepthMap map;
 
-  Scene() {
+  ContourScene() {
     const testing::PlacedMesh bodies[] = {{testing::l_block(), T_scene_model}};
     map = testing::scan_map(bodies, {}, model.diameter);
   }
 };
 
 TEST(ContourVotes, FindAPartOfWhichOnlyAFlatSideShows) {
-  const Scene scene;
+  const ContourScene scene;
   const Votes votes = contour_votes(scene.map, scene.model, 1, {});
   EXPECT_GT(votes.scene_pairs, 100u);
   ClusterOptions options;
@@ -64,7 +64,7 @@ void scatter_contours(DepthMap& map) {
 }
 
 TEST(ContourVotes, ComeFromThePairsThatALoopOverAllFinds) {
-  Scene scene;
+  ContourScene scene;
   scatter_contours(scene.map);
   const auto diameter = static_cast<float>(scene.model.diameter);
   std::size_t pairs = 0;
@@ -81,19 +81,19 @@ TEST(ContourVotes, ComeFromThePairsThatALoopOverAllFinds) {
 }
 
 TEST(ContourVotes, AreNoneWithoutContours) {
-  Scene scene;
+  ContourScene scene;
   scene.map.contours.clear();
   EXPECT_TRUE(contour_votes(scene.map, scene.model, 1, {}).votes.empty());
 }
 
 TEST(ContourVotes, AreNoneOnTheBackground) {
-  Scene scene;
+  ContourScene scene;
   scene.map.background.assign(scene.map.pixels.size(), 1);
   EXPECT_TRUE(contour_votes(scene.map, scene.model, 1, {}).votes.empty());
 }
 
 TEST(ContourVotes, AreTheSameOnAnyNumberOfThreads) {
-  const Scene scene;
+  const ContourScene scene;
   const Votes one = contour_votes(scene.map, scene.model, 1, {});
   for (const int threads : {2, 4}) {
     RunControl control;

@@ -11,13 +11,13 @@ namespace {
 using Eigen::Vector3d;
 
 /// Two equal parts side by side.
-struct Scene {
+struct RankedScene {
   Model model;
   Pose poses[2];
   DepthMap map;
   std::vector<VerifyOptions> options;
 
-  Scene(const Mesh& mesh, const Pose& first, const Pose& second)
+  RankedScene(const Mesh& mesh, const Pose& first, const Pose& second)
       : model(testing::quick_model(mesh)), poses{first, second} {
     const testing::PlacedMesh bodies[] = {{mesh, first}, {mesh, second}};
     map = testing::scan_map(bodies, {}, model.diameter);
@@ -44,7 +44,7 @@ struct Scene {
   }
 };
 
-Scene blocks() {
+RankedScene blocks() {
   return {testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {-0.07, 0, 0.43}),
           testing::pose(-35, {1, 0.2, 0.6}, {0.06, -0.01, 0.43})};
 }
@@ -52,7 +52,7 @@ Scene blocks() {
 Pose shifted(const Pose& pose, double x) { return Eigen::Translation3d(x, 0, 0) * pose; }
 
 TEST(Rank, KeepsOneOfEachInstanceBestFirst) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   std::vector<Candidate> candidates;
   for (const double x : {0.0006, -0.0006, 0.0, 0.001, -0.001}) {
     for (const Pose& pose : scene.poses) candidates.push_back(scene.candidate(shifted(pose, x)));
@@ -65,8 +65,8 @@ TEST(Rank, KeepsOneOfEachInstanceBestFirst) {
 }
 
 TEST(Rank, SuppressesTheTurnsOfASymmetricPart) {
-  const Scene scene(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {-0.05, 0, 0.494}),
-                    testing::pose(20, {1, 0, 3}, {0.05, 0, 0.48}));
+  const RankedScene scene(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {-0.05, 0, 0.494}),
+                          testing::pose(20, {1, 0, 3}, {0.05, 0, 0.48}));
   std::vector<Candidate> candidates;
   for (const Pose& pose : scene.poses) {
     for (int turn = 0; turn < 6; ++turn) {
@@ -80,7 +80,7 @@ TEST(Rank, SuppressesTheTurnsOfASymmetricPart) {
 }
 
 TEST(Rank, DropsWhatScoresTooLittle) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   const Candidate good = scene.candidate(scene.poses[0]), bad = scene.candidate(shifted(scene.poses[1], 0.03));
   ASSERT_LT(bad.evidence.score(), 0.3F);
   EXPECT_EQ(scene.ranked({bad, good}, 0.3).size(), 1u);
@@ -89,7 +89,7 @@ TEST(Rank, DropsWhatScoresTooLittle) {
 }
 
 TEST(Rank, KeepsApartTheBestOfThoseThatScoreTooLittle) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   const Candidate good = scene.candidate(scene.poses[0]), fair = scene.candidate(shifted(scene.poses[1], 0.0015));
   const Candidate hopeless = scene.candidate(shifted(scene.poses[1], 0.03));
   const double min_score = (good.score() + fair.score()) / 2;
@@ -103,7 +103,7 @@ TEST(Rank, KeepsApartTheBestOfThoseThatScoreTooLittle) {
 }
 
 TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   const Candidate sure = scene.candidate(scene.poses[0]), doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
   ASSERT_LT(doubtful.score(), sure.score());
   const double between = (sure.score() + doubtful.score()) / 2;
@@ -122,7 +122,7 @@ TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
 }
 
 TEST(Rank, TakesAPoseOfWhichLittleShowsForWeakProof) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   const Candidate whole = scene.candidate(scene.poses[0]);
   Candidate edge_on = whole;
   edge_on.evidence.area = 0.5F;
@@ -132,7 +132,7 @@ TEST(Rank, TakesAPoseOfWhichLittleShowsForWeakProof) {
 }
 
 TEST(Rank, GivesBackWhatAnAbsentModelTook) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   Candidate first = scene.candidate(scene.poses[0]), second = scene.candidate(shifted(scene.poses[0], 0.0001));
   // As if the one's model showed much more on average, so that this pose proves it less.
   Model absent = scene.model, present = scene.model;
@@ -153,7 +153,7 @@ TEST(Rank, GivesBackWhatAnAbsentModelTook) {
 }
 
 TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   const Candidate sure = scene.candidate(scene.poses[0]);
   Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
   doubtful.model_index = 1;
@@ -166,7 +166,7 @@ TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
 }
 
 TEST(Rank, OfEqualScoresKeepsTheOrderOfTheList) {
-  const Scene scene = blocks();
+  const RankedScene scene = blocks();
   std::vector<Candidate> candidates(3, scene.candidate(scene.poses[0]));
   for (int i = 0; i < 3; ++i) candidates[i].votes = static_cast<float>(i);
   const std::vector<Candidate> kept = scene.ranked(candidates, 0.3);

@@ -17,7 +17,7 @@ struct Error {
   double degrees, metres;
 };
 
-struct Scan : testing::PartScan {
+struct RefinedScan : testing::PartScan {
   using PartScan::PartScan;
 
   RefineOptions options() const {
@@ -43,7 +43,7 @@ struct Scan : testing::PartScan {
 };
 
 TEST(Refine, ConvergesFromThreeDegreesAndFivePercent) {
-  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  const RefinedScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   scenes::Random random(3);
   for (int i = 0; i < 20; ++i) {
     const Vector3d axis = random.rotation() * Vector3d::UnitX(), shift = random.rotation() * Vector3d(0.05, 0, 0);
@@ -56,7 +56,7 @@ TEST(Refine, ConvergesFromThreeDegreesAndFivePercent) {
 TEST(Refine, StaysAtTheTruth) {
   for (const Pose& pose :
        {testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}), testing::pose(25, {0, 1, 1}, {0.02, 0, 0.45})}) {
-    const Scan scan(testing::l_block(), pose);
+    const RefinedScan scan(testing::l_block(), pose);
     const Error error = scan.error(scan.refined(pose));
     EXPECT_LT(error.degrees, 0.4);
     EXPECT_LT(error.metres, 0.005 * scan.model.diameter);
@@ -65,7 +65,7 @@ TEST(Refine, StaysAtTheTruth) {
 
 TEST(Refine, HoldsAFlatPartByItsRim) {
   // Of a plate on the floor only the top shows: nothing but its rim tells where it lies.
-  Scan scan(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {0, 0, 0.494}));
+  RefinedScan scan(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {0, 0, 0.494}));
   const Pose start = scan.disturbed(0, Vector3d::UnitZ(), {0.04, 0.03, 0});
   EXPECT_LT(scan.error(scan.refined(start)).metres, 0.015 * scan.model.diameter);
   scan.map.contours.clear();
@@ -74,7 +74,7 @@ TEST(Refine, HoldsAFlatPartByItsRim) {
 }
 
 TEST(Refine, LeavesAPoseAloneWhereNothingIs) {
-  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  const RefinedScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   for (const Vector3d& at : {Vector3d(5, 0, 0.5), Vector3d(0, 0, -0.5), Vector3d(0, 0, 0.2)}) {
     const Pose nowhere = testing::pose(10, Vector3d::UnitX(), at);
     EXPECT_TRUE(scan.refined(nowhere).isApprox(nowhere, 1e-5)) << at.transpose();
@@ -82,7 +82,7 @@ TEST(Refine, LeavesAPoseAloneWhereNothingIs) {
 }
 
 TEST(Refine, KeepsARotation) {
-  const Scan scan(testing::stepped_shaft(), testing::pose(80, {1, 0.5, 0.2}, {0, 0, 0.45}));
+  const RefinedScan scan(testing::stepped_shaft(), testing::pose(80, {1, 0.5, 0.2}, {0, 0, 0.45}));
   const Pose found = scan.refined(scan.disturbed(3, Vector3d::UnitX(), {0.03, 0, 0}));
   EXPECT_TRUE(found.linear().isUnitary(1e-4));
   EXPECT_NEAR(found.linear().determinant(), 1, 1e-4);

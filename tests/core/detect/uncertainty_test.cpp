@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Scan : testing::PartScan {
+struct UncertainScan : testing::PartScan {
   using PartScan::PartScan;
 
   Uncertainty uncertainty() const {
@@ -23,7 +23,7 @@ struct Scan : testing::PartScan {
 };
 
 TEST(Uncertainty, ABlockOfWhichThreeSidesShowIsHeldInAllDirections) {
-  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  const UncertainScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   const Uncertainty found = scan.uncertainty();
   EXPECT_TRUE(found.free_directions.empty());
   EXPECT_TRUE(found.covariance.isApprox(found.covariance.transpose(), 1e-9));
@@ -32,7 +32,7 @@ TEST(Uncertainty, ABlockOfWhichThreeSidesShowIsHeldInAllDirections) {
 }
 
 TEST(Uncertainty, ATurnAboutAnAxisOfRevolutionIsFree) {
-  const Scan scan(testing::stepped_shaft(), testing::pose(80, Vector3d::UnitX(), {0, 0, 0.45}));
+  const UncertainScan scan(testing::stepped_shaft(), testing::pose(80, Vector3d::UnitX(), {0, 0, 0.45}));
   const Uncertainty found = scan.uncertainty();
   ASSERT_EQ(found.free_directions.size(), 1u);
   const Vector3d turn = found.free_directions[0].tail<3>();
@@ -41,7 +41,7 @@ TEST(Uncertainty, ATurnAboutAnAxisOfRevolutionIsFree) {
 }
 
 TEST(Uncertainty, APlateIsHeldByItsRimAndSlidesWithoutIt) {
-  Scan scan(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {0, 0, 0.494}));
+  UncertainScan scan(testing::hexagon(), testing::pose(10, Vector3d::UnitZ(), {0, 0, 0.494}));
   EXPECT_TRUE(scan.uncertainty().free_directions.empty());
   scan.map.contours.clear();
   scan.map.contour_at.assign(scan.map.pixels.size(), -1);
@@ -55,7 +55,7 @@ TEST(Uncertainty, APlateIsHeldByItsRimAndSlidesWithoutIt) {
 TEST(Uncertainty, IsAboutWhatRefinementErrsByOverManyScans) {
   constexpr int kScans = 40;
   constexpr double kNoise = 3e-4;
-  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  const UncertainScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   testing::PinholeSensor sensor = testing::bin_sensor();
   sensor.noise = kNoise;
   const RefineOptions options = {.first_gate = static_cast<float>(0.03 * scan.model.diameter),
@@ -87,7 +87,7 @@ TEST(Uncertainty, IsAboutWhatRefinementErrsByOverManyScans) {
 }
 
 TEST(Uncertainty, AnErrorOfTwiceTheSizeHasFourTimesTheCovariance) {
-  const Scan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  const UncertainScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
   const auto with = [&](double residual) {
     return uncertainty_of(scan.map, scan.model, testing::in_view(scan.map, scan.T_scene_model),
                           final_verification(scan.map, scan.model), residual)

@@ -16,12 +16,12 @@ Mesh marked_hexagon() {
                          testing::shifted(testing::box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F}));
 }
 
-struct Scan {
+struct MarkedScan {
   Model model = testing::quick_model(marked_hexagon());
   Pose T_scene_model;
   DepthMap map;
 
-  explicit Scan(const Pose& pose) : T_scene_model(pose) {
+  explicit MarkedScan(const Pose& pose) : T_scene_model(pose) {
     map = testing::scan_map({{{marked_hexagon(), pose}}}, {}, model.diameter);
   }
   VariantChoice choose(const Pose& T) const {
@@ -38,7 +38,7 @@ const Pose kMarkSeen = testing::pose(175, Vector3d::UnitX(), {0, 0, 0.35});
 const Pose kMarkHidden = testing::pose(5, Vector3d::UnitX(), {0, 0, 0.35});
 
 TEST(Variants, TellATurnFromTheTruthByTheMark) {
-  const Scan scan(kMarkSeen);
+  const MarkedScan scan(kMarkSeen);
   ASSERT_FALSE(scan.model.similar_poses.empty());
   for (int sixth = 0; sixth < 6; ++sixth) {
     const VariantChoice choice = scan.choose(turned(kMarkSeen, 60 * sixth));
@@ -51,7 +51,7 @@ TEST(Variants, TellATurnFromTheTruthByTheMark) {
 }
 
 TEST(Variants, AreRivalsWhenTheMarkIsHidden) {
-  const Scan scan(kMarkHidden);
+  const MarkedScan scan(kMarkHidden);
   const VariantChoice choice = scan.choose(kMarkHidden);
   EXPECT_GE(choice.rivals.size(), 5u);
   EXPECT_LT(choice.confidence, 0.5F);

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Scan : testing::PartScan {
+struct VerifiedScan : testing::PartScan {
   using PartScan::PartScan;
 
   VerifyOptions options() const {
@@ -37,7 +37,7 @@ const Pose kTilted = testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43});
 
 TEST(Verify, ExplainsNearlyAllAtTheTruth) {
   for (const Pose& pose : {kLying, kTilted}) {
-    const Scan scan(testing::l_block(), pose);
+    const VerifiedScan scan(testing::l_block(), pose);
     const Evidence evidence = scan.evidence(pose);
     EXPECT_GT(evidence.explained, 0.9F);
     EXPECT_LT(evidence.violated, 0.04F);
@@ -49,7 +49,7 @@ TEST(Verify, ExplainsNearlyAllAtTheTruth) {
 }
 
 /// What verify() computes for eight points at a time, one point after the other.
-Evidence surface_evidence_by_loop(const Scan& scan, const Eigen::Isometry3f& T, const VerifyOptions& options) {
+Evidence surface_evidence_by_loop(const VerifiedScan& scan, const Eigen::Isometry3f& T, const VerifyOptions& options) {
   Evidence sum;
   double total = 0;
   const float slack = options.tolerance + 1.5F * scan.map.pixel_size;
@@ -83,7 +83,7 @@ void for_each_tried_pose(Use&& use) {
   const testing::PlacedMesh in_front = {testing::box({0.03F, 0.03F, 0.01F}),
                                         testing::pose(0, Vector3d::UnitZ(), {0, 0, 0.36})};
   for (const Pose& pose : {kLying, kTilted}) {
-    const Scan scan(testing::l_block(), pose, {in_front});
+    const VerifiedScan scan(testing::l_block(), pose, {in_front});
     for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0.05, 0, 0), Vector3d(0, 0.1, -0.03)}) {
       const Eigen::Isometry3f T = testing::in_view(scan.map, scan.moved(by));
       use(scan, T);
@@ -103,7 +103,7 @@ float depth_behind_by_hand(const DepthMap& map, const ContourPoint& contour, con
 }
 
 /// Outline points confirmed and contradicted, one point after the other: there up to a pixel inside, gone two outside.
-std::pair<int, int> outline_by_loop(const Scan& scan, const Eigen::Isometry3f& T, float tolerance) {
+std::pair<int, int> outline_by_loop(const VerifiedScan& scan, const Eigen::Isometry3f& T, float tolerance) {
   int confirmed = 0, contradicted = 0;
   for (const ContourPoint& contour : scan.model.outlines[nearest_viewpoint(scan.model, T)]) {
     const float inside = depth_behind_by_hand(scan.map, contour, T, -scan.map.pixel_size, 5);
@@ -121,7 +121,7 @@ std::pair<int, int> outline_by_loop(const Scan& scan, const Eigen::Isometry3f& T
 }
 
 TEST(Verify, ComparesEightOutlinePointsAtATimeAsALoopDoesOneByOne) {
-  for_each_tried_pose([](const Scan& scan, const Eigen::Isometry3f& T) {
+  for_each_tried_pose([](const VerifiedScan& scan, const Eigen::Isometry3f& T) {
     const Evidence fast = verify(scan.map, scan.model, T, scan.options());
     const auto [confirmed, contradicted] = outline_by_loop(scan, T, scan.options().tolerance);
     const auto count = static_cast<float>(scan.model.outlines[nearest_viewpoint(scan.model, T)].size());
@@ -133,7 +133,7 @@ TEST(Verify, ComparesEightOutlinePointsAtATimeAsALoopDoesOneByOne) {
 }
 
 TEST(Verify, ComparesEightPointsAtATimeAsALoopDoesOneByOne) {
-  for_each_tried_pose([](const Scan& scan, const Eigen::Isometry3f& T) {
+  for_each_tried_pose([](const VerifiedScan& scan, const Eigen::Isometry3f& T) {
     const Evidence fast = verify(scan.map, scan.model, T, scan.options());
     const Evidence slow = surface_evidence_by_loop(scan, T, scan.options());
     // A point on a limit may fall to either side.
@@ -145,7 +145,7 @@ TEST(Verify, ComparesEightPointsAtATimeAsALoopDoesOneByOne) {
 }
 
 TEST(Verify, SharesAddUpToAtMostAll) {
-  const Scan scan(testing::l_block(), kTilted);
+  const VerifiedScan scan(testing::l_block(), kTilted);
   for (const double by : {0.0, 0.05, 0.2, 0.5, -0.1}) {
     const Evidence e = scan.evidence(scan.moved({by, by / 2, by / 3}));
     EXPECT_LE(e.explained + e.violated + e.occluded + e.unexplained, 1.001F);
@@ -156,7 +156,7 @@ TEST(Verify, SharesAddUpToAtMostAll) {
 }
 
 TEST(Verify, ScoresAShiftedPoseFarBelowTheTruth) {
-  const Scan scan(testing::l_block(), kTilted);
+  const VerifiedScan scan(testing::l_block(), kTilted);
   const float truth = scan.evidence(scan.T_scene_model).score();
   for (const Vector3d& by : {Vector3d(0.15, 0, 0), Vector3d(0, -0.15, 0), Vector3d(0, 0, 0.1), Vector3d(0, 0, -0.1)}) {
     EXPECT_LT(scan.evidence(scan.moved(by)).score(), 0.4F * truth) << by.transpose();
@@ -164,7 +164,7 @@ TEST(Verify, ScoresAShiftedPoseFarBelowTheTruth) {
 }
 
 TEST(Verify, CallsAPoseInFrontOfTheSceneViolatedAndOneBehindItOccluded) {
-  const Scan scan(testing::l_block(), kLying);
+  const VerifiedScan scan(testing::l_block(), kLying);
   const Evidence front = scan.evidence(scan.moved({0, 0, -0.15}));
   EXPECT_GT(front.violated, 0.9F);
   EXPECT_EQ(front.score(), 0);
@@ -174,8 +174,8 @@ TEST(Verify, CallsAPoseInFrontOfTheSceneViolatedAndOneBehindItOccluded) {
 }
 
 TEST(Verify, CallsWhatLiesUnderAnotherPartOccluded) {
-  const Scan scan(testing::l_block(), kLying,
-                  {{testing::box({0.2F, 0.05F, 0.01F}), testing::pose(0, Vector3d::UnitZ(), {0, 0.03, 0.42})}});
+  const VerifiedScan scan(testing::l_block(), kLying,
+                          {{testing::box({0.2F, 0.05F, 0.01F}), testing::pose(0, Vector3d::UnitZ(), {0, 0.03, 0.42})}});
   // The share that rays to the visible points do not reach.
   double hidden = 0, all = 0;
   const Eigen::Isometry3f T_view_model = testing::in_view(scan.map, kLying);
@@ -197,7 +197,7 @@ TEST(Verify, CallsWhatLiesUnderAnotherPartOccluded) {
 
 TEST(Verify, DoesNotFallForAFlatFacePosedInsideALargerOne) {
   // Top face at the height of the floor: every point is there, but the surface goes on at its rim.
-  const Scan scan(testing::hexagon(), testing::pose(0, Vector3d::UnitZ(), {0.04, 0, 0.494}));
+  const VerifiedScan scan(testing::hexagon(), testing::pose(0, Vector3d::UnitZ(), {0.04, 0, 0.494}));
   const Pose in_floor = testing::pose(10, Vector3d::UnitZ(), {-0.04, 0, 0.506});
   const Evidence evidence = scan.evidence(in_floor);
   EXPECT_GT(evidence.explained, 0.9F);
@@ -207,7 +207,7 @@ TEST(Verify, DoesNotFallForAFlatFacePosedInsideALargerOne) {
 }
 
 TEST(Verify, LeavesOwnedPixelsUnexplained) {
-  const Scan scan(testing::l_block(), kTilted);
+  const VerifiedScan scan(testing::l_block(), kTilted);
   const std::vector<int> all(scan.map.pixels.size(), 0), none(scan.map.pixels.size(), -1);
   const Eigen::Isometry3f T = testing::in_view(scan.map, kTilted);
   EXPECT_EQ(verify(scan.map, scan.model, T, scan.options(), &all).explained, 0);
@@ -215,13 +215,13 @@ TEST(Verify, LeavesOwnedPixelsUnexplained) {
 }
 
 TEST(Verify, ExplainsNothingByTheBackground) {
-  Scan scan(testing::l_block(), kTilted);
+  VerifiedScan scan(testing::l_block(), kTilted);
   scan.map.background.assign(scan.map.pixels.size(), 1);
   EXPECT_EQ(scan.evidence(kTilted).explained, 0);
 }
 
 TEST(Verify, OfFewPointsIsCloseToThatOfAll) {
-  const Scan scan(testing::l_block(), kTilted);
+  const VerifiedScan scan(testing::l_block(), kTilted);
   VerifyOptions few = scan.options();
   few.most_points = 80;
   for (const double by : {0.0, 0.03, 0.06}) {
@@ -232,14 +232,14 @@ TEST(Verify, OfFewPointsIsCloseToThatOfAll) {
 }
 
 TEST(Verify, OfPosesOutOfSightIsNoEvidence) {
-  const Scan scan(testing::l_block(), kTilted);
+  const VerifiedScan scan(testing::l_block(), kTilted);
   for (const Vector3d& at : {Vector3d(0, 0, -0.5), Vector3d(5, 0, 0.5), Vector3d(0, 0, 0), Vector3d(1e30, 0, 1e30)}) {
     EXPECT_LT(scan.evidence(testing::pose(0, Vector3d::UnitZ(), at)).score(), 0.01F) << at.transpose();
   }
 }
 
 TEST(AlignmentScore, IsOneLessTheMeanDistanceOverTheCutoff) {
-  const Scan scan(testing::l_block(), kLying);
+  const VerifiedScan scan(testing::l_block(), kLying);
   const auto cutoff = static_cast<float>(0.1 * scan.model.diameter);
   const auto score = [&](const Pose& T) {
     return alignment_score(scan.map, scan.model, testing::in_view(scan.map, T), cutoff);

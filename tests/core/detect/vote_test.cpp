@@ -15,13 +15,13 @@ namespace {
 constexpr double kBinMargin = 6 * kDegree;  // that a look-up forgives, see model.cpp
 
 /// A block at a known pose, with what votes are made from.
-struct Scene {
+struct VoteScene {
   Model model = testing::quick_model(testing::l_block());
   Pose T_scene_model = testing::pose(35, {1, 2, 0.5}, {-0.01, 0.01, 0.44});
   DepthMap map;
   ScenePoints points;
 
-  Scene() {
+  VoteScene() {
     const testing::PlacedMesh bodies[] = {{testing::l_block(), T_scene_model}};
     map = testing::scan_map(bodies, {}, model.diameter);
     points = down_sample(map, 3);
@@ -69,7 +69,7 @@ void match_linearly(const Model& model, int scale, const SurfacePoint& p, const 
 }
 
 /// All matches from the start points, by a triple loop.
-std::vector<Match> all_matches(const Scene& scene, std::span<const int> starts, double tolerance,
+std::vector<Match> all_matches(const VoteScene& scene, std::span<const int> starts, double tolerance,
                                std::uint64_t& triples) {
   const std::vector<SurfacePoint>& points = scene.points.points;
   const double slack = scene.model.params.relative_length_tolerance * scene.model.diameter;
@@ -100,7 +100,7 @@ bool same(const PoseVote& a, const PoseVote& b) {
 }
 
 TEST(Vote, IsGivenForJustTheMatchesOfATripleLoopInOrder) {
-  const Scene scene;
+  const VoteScene scene;
   std::vector<int> on_block, starts;
   for (const int i : start_points(scene.points, 1)) {
     if (scene.points.points[i].position.z() < 0.48F) on_block.push_back(i);
@@ -125,7 +125,7 @@ TEST(Vote, IsGivenForJustTheMatchesOfATripleLoopInOrder) {
 }
 
 TEST(Vote, GathersAtTheTruePose) {
-  const Scene scene;
+  const VoteScene scene;
   const Votes votes = vote(scene.points, start_points(scene.points, 0.5), scene.map, scene.model, DetectParams{}, {});
   const Eigen::Isometry3f truth = testing::in_view(scene.map, scene.T_scene_model);
   const Eigen::Vector3f centre = truth * scene.model.centre.cast<float>();
@@ -139,7 +139,7 @@ TEST(Vote, GathersAtTheTruePose) {
 }
 
 TEST(Vote, IsTheSameOnAnyNumberOfThreads) {
-  const Scene scene;
+  const VoteScene scene;
   const std::vector<int> starts = start_points(scene.points, 0.3);
   const Votes one = vote(scene.points, starts, scene.map, scene.model, DetectParams{}, {});
   for (const int threads : {2, 4}) {
@@ -156,7 +156,7 @@ TEST(Vote, IsTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(Vote, ByFeaturesAloneIsGivenForEveryPairOfTheBins) {
-  const Scene scene;
+  const VoteScene scene;
   DetectParams no_gate;
   no_gate.normal_tolerance = 180 * kDegree;
   const std::vector<int> starts = start_points(scene.points, 0.05);
@@ -167,7 +167,7 @@ TEST(Vote, ByFeaturesAloneIsGivenForEveryPairOfTheBins) {
 }
 
 TEST(Vote, EndsWhenStopped) {
-  const Scene scene;
+  const VoteScene scene;
   std::stop_source source;
   source.request_stop();
   RunControl control;

@@ -37,7 +37,7 @@ SensorView one_side() {
   return sensor_view(scattered(std::move(scan.points))).value();
 }
 
-int measured_count(const DepthMap& map) {
+int count_measured(const DepthMap& map) {
   int count = 0;
   for (std::size_t i = 0; i < map.pixels.size(); ++i) count += map.measured(static_cast<int>(i)) ? 1 : 0;
   return count;
@@ -80,9 +80,9 @@ TEST(HiddenSurfaces, AreNoneOnOneSlantedSurfaceOrBehindAWideHole) {
     }
   }
   DepthMap map = depth_map(sensor_view(scattered(std::move(points))).value(), 0.0022);
-  const int before = measured_count(map);
+  const int before = count_measured(map);
   hide_behind_gaps(map);
-  EXPECT_GT(measured_count(map), 0.97 * before);
+  EXPECT_GT(count_measured(map), 0.97 * before);
 }
 
 }  // namespace

@@ -15,17 +15,17 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr double kPixel = 0.002;
+constexpr double kMapPixel = 0.002;
 
 /// The bodies from above, with normals of a 3 x 3 window.
 DepthMap map_of(std::span<const testing::PlacedMesh> bodies, std::optional<double> floor_depth, double noise = 0) {
   testing::PinholeSensor sensor;
   sensor.width = 150;
   sensor.height = 112;
-  sensor.focal = 1.25 * 0.5 / kPixel;  // more than a point per pixel
+  sensor.focal = 1.25 * 0.5 / kMapPixel;  // more than a point per pixel
   sensor.floor_depth = floor_depth;
   sensor.noise = noise;
-  DepthMap map = depth_map(*sensor_view(testing::render(bodies, sensor)), kPixel);
+  DepthMap map = depth_map(*sensor_view(testing::render(bodies, sensor)), kMapPixel);
   estimate_normals(map, 1);
   return map;
 }
@@ -79,7 +79,7 @@ Vector3f pca_normal(const DepthMap& map, int u, int v) {
   for (int row = v - 1; row <= v + 1; ++row) {
     for (int column = u - 1; column <= u + 1; ++column) {
       const Vector3f& p = map.pixels[row * map.width + column].position;
-      if (p.z() > 0 && std::abs(p.z() - centre.z()) < 2 * static_cast<float>(kPixel)) window.push_back(p);
+      if (p.z() > 0 && std::abs(p.z() - centre.z()) < 2 * static_cast<float>(kMapPixel)) window.push_back(p);
     }
   }
   if (window.size() < 9) return Vector3f::Zero();
@@ -137,7 +137,7 @@ TEST(Normals, OfGrazingSurfacesAndLonelyPointsDoNotExist) {
   lonely.points = {{0, 0, 0.5F}, {0.1F, 0, 0.5F}, {0, 0.1F, 0.5F}};
   lonely.width = 3;
   lonely.height = 1;
-  DepthMap sparse = depth_map(*sensor_view(lonely), kPixel);
+  DepthMap sparse = depth_map(*sensor_view(lonely), kMapPixel);
   estimate_normals(sparse, 1);
   for (const SurfacePoint& pixel : sparse.pixels) EXPECT_TRUE(pixel.normal.isZero());
 }

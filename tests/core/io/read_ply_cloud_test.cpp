@@ -15,14 +15,14 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr std::size_t kMaxPoints = 100;
+constexpr std::size_t kMaxPlyPoints = 100;
 
 constexpr std::string_view kHeader =
     "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n";
 
 TEST(ReadPlyCloud, ReadsPointsInMetres) {
   const absl::StatusOr<PointCloud> cloud =
-      read_ply_cloud(std::string(kHeader) + "end_header\n1 2 3\n4 nan 6\n", 0.001, kMaxPoints);
+      read_ply_cloud(std::string(kHeader) + "end_header\n1 2 3\n4 nan 6\n", 0.001, kMaxPlyPoints);
   ASSERT_TRUE(cloud.ok()) << cloud.status();
   ASSERT_EQ(cloud->points.size(), 2u);
   EXPECT_EQ(cloud->width, 2u);
@@ -41,7 +41,7 @@ TEST(ReadPlyCloud, ReadsBinaryDoublesBehindOtherColumns) {
     std::memcpy(raw.data(), &coordinate, raw.size());
     bytes.append(raw.data(), raw.size());
   }
-  const absl::StatusOr<PointCloud> cloud = read_ply_cloud(bytes, 1, kMaxPoints);
+  const absl::StatusOr<PointCloud> cloud = read_ply_cloud(bytes, 1, kMaxPlyPoints);
   ASSERT_TRUE(cloud.ok()) << cloud.status();
   EXPECT_EQ(cloud->points[0], Eigen::Vector3f(1.5f, -2.5f, 3.5f));
 }
@@ -51,7 +51,7 @@ TEST(ReadPlyCloud, MakesNormalsUnitVectors) {
       read_ply_cloud(std::string(kHeader) +
                          "property float nx\nproperty float ny\nproperty float nz\nend_header\n"
                          "1 2 3 0 0 -2\nnan nan nan 0 0 0\n",
-                     1, kMaxPoints);
+                     1, kMaxPlyPoints);
   ASSERT_TRUE(cloud.ok()) << cloud.status();
   ASSERT_EQ(cloud->normals.size(), 2u);
   EXPECT_EQ(cloud->normals[0], Eigen::Vector3f(0, 0, -1));
@@ -62,7 +62,7 @@ TEST(ReadPlyCloud, DropsTheNormalsWhenAMeasuredPointHasNone) {
       read_ply_cloud(std::string(kHeader) +
                          "property float nx\nproperty float ny\nproperty float nz\nend_header\n"
                          "1 2 3 0 0 -1\n1 2 3 0 0 0\n",
-                     1, kMaxPoints);
+                     1, kMaxPlyPoints);
   ASSERT_TRUE(cloud.ok()) << cloud.status();
   EXPECT_TRUE(cloud->normals.empty());
 }
@@ -75,7 +75,7 @@ TEST(ReadPlyCloud, RefusesMorePointsThanTheLimit) {
 
 TEST(ReadPlyCloud, RefusesWhatIsTruncatedOrLacksAColumn) {
   const auto refusal = [](const std::string& bytes) {
-    const absl::StatusOr<PointCloud> cloud = read_ply_cloud(bytes, 1, kMaxPoints);
+    const absl::StatusOr<PointCloud> cloud = read_ply_cloud(bytes, 1, kMaxPlyPoints);
     EXPECT_EQ(cloud.status().code(), absl::StatusCode::kInvalidArgument);
     return std::string(cloud.status().message());
   };

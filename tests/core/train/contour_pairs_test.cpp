@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr double kDiameter = 0.1;
+constexpr double kRimDiameter = 0.1;
 constexpr int kViews = 100;
 
 /// A point on a circle of 80 mm in the plane z = 0, whose surface ends outwards.
@@ -81,18 +81,18 @@ std::vector<PooledContour> circle() {
 
 TEST(SelectContourPairs, TakesCoplanarPairsOfTheRightLengthOncePerPoint) {
   const std::vector<PooledContour> contours = circle();
-  const RatedContourPairs rated = select_contour_pairs(contours, kDiameter, 10'000, kViews, {});
+  const RatedContourPairs rated = select_contour_pairs(contours, kRimDiameter, 10'000, kViews, {});
   ASSERT_EQ(rated.weights.size(), rated.pairs.size());
   std::size_t expected = 0;
   for (std::size_t a = 0; a < 30; ++a) {
     for (std::size_t b = a + 1; b < 30; ++b) {
-      const double share = (contours[a].point.position - contours[b].point.position).norm() / kDiameter;
+      const double share = (contours[a].point.position - contours[b].point.position).norm() / kRimDiameter;
       expected += static_cast<std::size_t>(share >= kShortestContourPair && share <= kLongestContourPair);
     }
   }
   EXPECT_EQ(rated.pairs.size(), expected);
   for (const ContourPair& pair : rated.pairs) {
-    const double share = (contours[pair.a].point.position - contours[pair.b].point.position).norm() / kDiameter;
+    const double share = (contours[pair.a].point.position - contours[pair.b].point.position).norm() / kRimDiameter;
     EXPECT_GE(share, kShortestContourPair);
     EXPECT_LE(share, kLongestContourPair);
   }
@@ -101,7 +101,7 @@ TEST(SelectContourPairs, TakesCoplanarPairsOfTheRightLengthOncePerPoint) {
 TEST(SelectContourPairs, RanksBySharedViewsOverTheRootOfFrequency) {
   // On a circle the weight, 1 / sqrt(frequency), tells the frequency; the masks tell the shared views.
   const std::vector<PooledContour> contours = circle();
-  const RatedContourPairs all = select_contour_pairs(contours, kDiameter, 10'000, kViews, {});
+  const RatedContourPairs all = select_contour_pairs(contours, kRimDiameter, 10'000, kViews, {});
   double before = 1e9;
   for (std::size_t i = 0; i < all.pairs.size(); ++i) {
     int shared = 0;
@@ -112,7 +112,7 @@ TEST(SelectContourPairs, RanksBySharedViewsOverTheRootOfFrequency) {
     EXPECT_LE(value, before * (1 + 1e-6)) << i;
     before = value;
   }
-  const RatedContourPairs few = select_contour_pairs(contours, kDiameter, 20, kViews, {});
+  const RatedContourPairs few = select_contour_pairs(contours, kRimDiameter, 20, kViews, {});
   ASSERT_EQ(few.pairs.size(), 20u);
   for (std::size_t i = 0; i < 20; ++i) {
     EXPECT_EQ(few.pairs[i].a, all.pairs[i].a);
@@ -125,7 +125,7 @@ TEST(SelectContourPairs, LetsNoPointTakePartInMoreThan40) {
   contours.reserve(200);
   for (int i = 0; i < 200; ++i) contours.push_back({on_circle(i, 200), ViewMask(2, ~std::uint64_t{0})});
   std::map<int, int> used;
-  for (const ContourPair& pair : select_contour_pairs(contours, kDiameter, 100'000, 128, {}).pairs) {
+  for (const ContourPair& pair : select_contour_pairs(contours, kRimDiameter, 100'000, 128, {}).pairs) {
     ++used[pair.a];
     ++used[pair.b];
   }
@@ -136,7 +136,7 @@ TEST(SelectContourPairs, LetsNoPointTakePartInMoreThan40) {
 TEST(SelectContourPairs, TakesNoneThatNoViewShowsWhole) {
   std::vector<PooledContour> contours = circle();
   for (std::size_t i = 0; i < contours.size(); ++i) contours[i].views = {std::uint64_t{1} << i, 0};
-  EXPECT_TRUE(select_contour_pairs(contours, kDiameter, 100, kViews, {}).pairs.empty());
+  EXPECT_TRUE(select_contour_pairs(contours, kRimDiameter, 100, kViews, {}).pairs.empty());
 }
 
 }  // namespace
