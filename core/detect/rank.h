@@ -26,8 +26,9 @@ struct Candidate {
   /// The evidence, times the confidence that none of the rivals is the right one.
   float score() const { return evidence.score() * confidence; }
   /// How surely the part is there: the score, less where less shows of it than of the part on average. Edges alone are
-  /// weak proof: the rim of a bin resembles many a part seen edge-on.
-  float presence() const { return evidence.strict_score() * confidence * std::min(1.0F, evidence.area); }
+  /// weak proof: the rim of a bin resembles many a part seen edge-on. Which of its poses is right does not matter to
+  /// it.
+  float presence() const { return evidence.strict_score() * std::min(1.0F, evidence.area); }
 };
 
 /// Candidates without doubles, best first.

@@ -35,7 +35,6 @@ DetectResult detected(const testing::PartScan& scan) {
   sensor.noise = 1e-4;
   const Model* models[] = {&scan.model};
   DetectParams params;
-  params.presence_score = 0;  // a part alone whose pose is not sure would not be answered
   return *detect(testing::render(scan.bodies, sensor), models, params, {});
 }
 
