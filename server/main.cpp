@@ -101,5 +101,6 @@ int main(int argc, char** argv) {
   spdlog::info("ending on signal {}", signal);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);  // a second one ends the process at once
   (*server)->stop();
+  if ((*server)->waits_for_directory()) std::_Exit(EXIT_SUCCESS);  // a share may hang for hours
   return EXIT_SUCCESS;
 }

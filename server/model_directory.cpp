@@ -136,9 +136,14 @@ absl::Status make_model_directory(const std::filesystem::path& directory) {
     return absl::InternalError(
         absl::StrFormat("Cannot use %s as the model directory: %s.", directory.string(), error.message()));
   }
-  if (std::filesystem::exists(directory / kSign, error)) return absl::OkStatus();
+  if (has_sign(directory)) return absl::OkStatus();
   const absl::Status made = create_durably(directory, kSign, "A binpose model directory.\n");
   return absl::IsAlreadyExists(made) ? absl::OkStatus() : made;
+}
+
+bool has_sign(const std::filesystem::path& directory) {
+  std::error_code ignored;
+  return std::filesystem::exists(directory / kSign, ignored);
 }
 
 absl::StatusOr<DirectoryContent> list_model_directory(const std::filesystem::path& directory) {

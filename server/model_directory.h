@@ -47,6 +47,9 @@ std::uint32_t generation_of(const std::filesystem::path& model_path);
 /// Makes a model directory, or takes the one that is there. Errors: INTERNAL.
 absl::Status make_model_directory(const std::filesystem::path& directory);
 
+/// Whether it is there and answers.
+bool has_sign(const std::filesystem::path& directory);
+
 /// What two readings in a row agree on, since one that others write to meanwhile may see neither of two generations.
 /// Errors: UNAVAILABLE, when it cannot be read or is not the model directory, but for example the empty folder that a
 /// share was mounted on.

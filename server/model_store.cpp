@@ -34,7 +34,13 @@ absl::StatusOr<StoredModel> load_file(const std::filesystem::path& path, const s
 }  // namespace
 
 ModelStore::ModelStore(std::filesystem::path directory, const ModelLimits& limits)
-    : directory_(std::move(directory)), limits_(limits), cache_(limits.memory_bytes, load_file) {}
+    : directory_(std::move(directory)),
+      limits_(limits),
+      cache_(limits.memory_bytes,
+             [this](const std::filesystem::path& path, const std::string& id) {
+               return guard_.run([path, id] { return load_file(path, id); });
+             }),
+      guard_(directory_, [this] { return !is_away_ && has_sign(directory_); }) {}
 
 /// What came of looking for the newest generation of a model that can be used.
 struct ModelStore::Look {
@@ -117,7 +123,7 @@ bool ModelStore::follow_directory(int threads) {
   return is_settled;
 }
 
-/// The same for one model; its generations.
+/// The same for one model; its generations. Under the lock.
 absl::StatusOr<Generations> ModelStore::follow_model(const std::string& id) {
   const absl::StatusOr<DirectoryContent> content = list_directory();
   if (!content.ok()) return content.status();
@@ -133,7 +139,7 @@ absl::StatusOr<Generations> ModelStore::follow_model(const std::string& id) {
 /// Notes whether the directory is there: a share that is away for a moment takes no model with it.
 absl::StatusOr<DirectoryContent> ModelStore::list_directory() {
   absl::StatusOr<DirectoryContent> content = list_model_directory(directory_);
-  if (content.ok()) last_look_ = Clock::now();
+  if (content.ok()) guard_.note_answer();
   if (is_away_ == content.ok()) {
     is_away_ = !content.ok();
     if (is_away_) {
@@ -144,8 +150,6 @@ absl::StatusOr<DirectoryContent> ModelStore::list_directory() {
   }
   return content;
 }
-
-double ModelStore::directory_age() const { return seconds_since(last_look_); }
 
 ModelStore::Look ModelStore::look_for(const std::string& id, const Generations& generations) const {
   Look look;
@@ -213,9 +217,11 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::find(const std::s
   auto found = cache_.find(id);
   if (!absl::IsUnavailable(found.status())) return found;
   // Its file may have been replaced and pruned since the last look.
-  const std::lock_guard disk_lock(disk_mutex_);
-  if (absl::Status status = follow_model(id).status(); !status.ok()) return status;
-  return cache_.find(id);
+  const absl::Status followed = guard_.run([this, id]() -> absl::Status {
+    const std::lock_guard disk_lock(disk_mutex_);
+    return follow_model(id).status();
+  });
+  return followed.ok() ? cache_.find(id) : followed;
 }
 
 std::uint32_t ModelStore::next_generation(const std::string& id, const Generations& known) const {
@@ -252,6 +258,11 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::st
   stored->model = std::move(model);
   stored->content_hash = content_hash(stored->model);
   if (absl::Status status = cache_.check_size(id, stored->model); !status.ok()) return status;
+  return guard_.run([this, stored] { return save(stored); });
+}
+
+absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::save(std::shared_ptr<StoredModel> stored) {
+  const std::string& id = stored->id;
   const std::lock_guard disk_lock(disk_mutex_);
   const auto place = publish_next(id, [&](std::uint32_t generation) -> absl::StatusOr<std::string> {
     stored->generation = generation;
@@ -267,6 +278,10 @@ absl::StatusOr<std::shared_ptr<const StoredModel>> ModelStore::put(const std::st
 }
 
 absl::Status ModelStore::remove(const std::string& id) {
+  return guard_.run([this, id] { return erase(id); });
+}
+
+absl::Status ModelStore::erase(const std::string& id) {
   const std::lock_guard disk_lock(disk_mutex_);
   int tries = 0;
   const auto place = publish_next(id, [&](std::uint32_t) -> absl::StatusOr<std::string> {

@@ -18,7 +18,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/clock.h"
+#include "server/hang_guard.h"
 #include "server/model_cache.h"
 #include "server/model_directory.h"
 
@@ -63,8 +63,8 @@ class ModelStore {
 
   /// Times that a file could not be used.
   std::size_t skipped_files() const { return skipped_files_; }
-  /// Seconds since the directory was last read; large while it is away.
-  double directory_age() const;
+  /// Seconds since the directory last answered; large while it is away.
+  double directory_age() const { return guard_.age(); }
 
  private:
   /// The file that a served model was read from.
@@ -82,6 +82,8 @@ class ModelStore {
   bool apply(const std::string& id, Look look);
   absl::StatusOr<Place> publish_next(
       const std::string& id, const std::function<absl::StatusOr<std::string>(std::uint32_t generation)>& content);
+  absl::StatusOr<std::shared_ptr<const StoredModel>> save(std::shared_ptr<StoredModel> stored);
+  absl::Status erase(const std::string& id);
   std::uint32_t next_generation(const std::string& id, const Generations& known) const;
   void drop(const std::string& id);
   void serve(std::shared_ptr<const StoredModel> stored, const Place& place);
@@ -92,14 +94,14 @@ class ModelStore {
   const ModelLimits limits_;
   ModelCache cache_;  ///< what is served
   std::atomic<std::size_t> skipped_files_ = 0;
-  std::atomic<Clock::time_point> last_look_ = Clock::now();  ///< when the directory was last read
-  std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change
+  std::atomic<bool> is_away_ = false;  ///< the directory
+  std::mutex disk_mutex_;              ///< guards what follows, and is held while a file and its entry change
   std::map<std::string, Generations, std::less<>> seen_;   ///< that were dealt with
   std::map<std::string, std::uint32_t, std::less<>> put_;  ///< generations that this server put last
   std::map<std::string, Place, std::less<>> places_;       ///< of the models that are served
   std::map<std::string, ModelFile> skipped_;               ///< files that were logged already, by path
-  bool is_away_ = false;                                   ///< the directory
-  std::jthread watcher_;                                   ///< last, so that it ends before the rest goes
+  HangGuard guard_;       ///< after all that its calls use, so that they end before that goes
+  std::jthread watcher_;  ///< last, for the same reason
 };
 
 }  // namespace binpose::server

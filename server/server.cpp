@@ -120,9 +120,12 @@ absl::Status Server::serve_metrics() {
   return absl::OkStatus();
 }
 
+bool Server::waits_for_directory() const {
+  return models_->directory_age() > std::chrono::duration<double>(kDirectoryPatience).count();
+}
+
 std::string Server::directory_detail() const {
-  constexpr double kPatience = 5;  // seconds; it is looked at twice a second
-  if (!is_ready_ || models_->directory_age() < kPatience) return "";
+  if (!is_ready_ || !waits_for_directory()) return "";
   return absl::StrFormat("The model directory has not been read for %.0f s; the models of then are served.\n",
                          models_->directory_age());
 }

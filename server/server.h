@@ -32,6 +32,9 @@ class Server {
   /// timeout; the rest is cancelled.
   void stop();
 
+  /// Whether the model directory does not answer: the destructor would wait for it.
+  bool waits_for_directory() const;
+
  private:
   explicit Server(const Config& config);
   absl::Status serve_metrics();

@@ -1,10 +1,13 @@
 #include "server/model_store.h"
 
+#include <dirent.h>
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <functional>
@@ -19,6 +22,26 @@
 #include "core/train/train.h"
 #include "tests/server/temporary_directory.h"
 #include "tests/server/test_part.h"
+
+namespace {
+
+std::atomic<bool> share_hangs = false;
+
+}  // namespace
+
+/// In place of the C library's, for all in this program: they hang as on a share whose file server is away, until that
+/// is back.
+extern "C" dirent* readdir(DIR* directory) {
+  static const auto read_entry = reinterpret_cast<dirent* (*)(DIR*)>(::dlsym(RTLD_NEXT, "readdir"));
+  share_hangs.wait(true);
+  return read_entry(directory);
+}
+
+extern "C" int stat(const char* path, struct stat* info) {
+  static const auto look_at = reinterpret_cast<int (*)(const char*, struct stat*)>(::dlsym(RTLD_NEXT, "stat"));
+  share_hangs.wait(true);
+  return look_at(path, info);
+}
 
 namespace binpose::server {
 namespace {
@@ -360,6 +383,22 @@ TEST_F(ModelStoreTest, SaysThatAModelIsOutOfReachWhileTheDirectoryIsAwayAndItIsN
   EXPECT_TRUE(store->describe("block").ok());
   std::filesystem::rename(path() / "away", models);
   EXPECT_TRUE(store->find("block").ok());
+}
+
+TEST_F(ModelStoreTest, KeepsNoCallerWhileTheDirectoryHangs) {
+  const auto store = ModelStore::open(path(), {.memory_bytes = memory_bytes(block()) * 3 / 2}).value();
+  ASSERT_TRUE(store->put("block", block()).ok());
+  ASSERT_TRUE(store->put("other", block()).ok());
+  share_hangs = true;
+  EXPECT_EQ(store->put("new", block()).status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(store->remove("other").code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(store->find("block").status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_TRUE(store->find("other").ok());
+  share_hangs = false;
+  share_hangs.notify_all();
+  while (store->directory_age() > 1) std::this_thread::yield();
+  EXPECT_TRUE(store->find("block").ok());
+  EXPECT_TRUE(store->put("block", block()).ok());
 }
 
 TEST_F(ModelStoreTest, LoadsOnSeveralThreadsWhatOneThreadLoads) {
