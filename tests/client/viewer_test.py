@@ -211,7 +211,11 @@ class ViewerTest(unittest.TestCase):
         self.assertNotEqual(self.colours(), outlined)
 
     def test_every_switch_changes_the_picture(self):
-        self.open(self.page)
+        def reject_the_last(data):
+            data["answer"]["rejected"] = [data["answer"]["hypotheses"].pop()]
+        page = self.folder / "rejected.html"
+        write_changed(page, self.page, reject_the_last)
+        self.open(page)
         for name in ["cloud", "parts", "truth", "rejected"]:
             before = self.colours()
             self.driver.find_element(By.CSS_SELECTOR, f"[data-shows={name}]").click()
