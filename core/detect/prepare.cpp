@@ -25,7 +25,7 @@ DepthMap map_of(const SensorView& view, double diameter, const RunControl& contr
   const double hidden = hidden_share(view, map);
   if (hidden > kMostHidden) {
     map = depth_map(view, std::max(least, kPixelPerSpacing * view.spacing / std::sqrt(1 - hidden)), control);
-    hide_behind_gaps(map);
+    hide_behind_gaps(map, control);
   }
   return map;
 }

@@ -153,6 +153,7 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
   if (control.stop.stop_requested()) return control.status();
   std::size_t seen_count = 0;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    if (i % 1024 == 0 && control.stop.stop_requested()) return control.status();
     if (!(view.points[i].z() > 0)) continue;
     view.points[seen_count++] = view.points[i];
     if (!cloud.normals.empty()) view.normals.emplace_back(R_view_scene * cloud.normals[i]);

@@ -1,7 +1,9 @@
 #include "core/geometry/hidden_surfaces.h"
 
 #include <algorithm>
-#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
 
 namespace binpose {
 namespace {
@@ -10,22 +12,25 @@ constexpr float kClearly = 3.0F;               // pixel widths
 constexpr float kBehindClosing = 0.75F;        // pixel widths
 constexpr std::size_t kEnoughPoints = 20'000;  // to tell a share
 
-/// Each value's extreme over itself and its 8 neighbours, as far as they are in the image.
+/// Each pixel's extreme over itself and its 8 neighbours, as far as they are in the image: first over rows, then over
+/// columns.
 template <typename Pick>
-std::vector<float> over_neighbours(const std::vector<float>& values, int width, int height, const Pick& pick) {
+std::vector<float> over_neighbours(const std::vector<float>& values, const DepthMap& map, const Pick& pick,
+                                   const RunControl& control) {
+  const int width = map.width, height = map.height;
   std::vector<float> in_rows(values.size()), result(values.size());
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const int i = v * width + u;
-      in_rows[i] = pick(values[i], pick(values[i - (u > 0 ? 1 : 0)], values[i + (u + 1 < width ? 1 : 0)]));
-    }
-  }
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const int i = v * width + u;
-      result[i] = pick(in_rows[i], pick(in_rows[v > 0 ? i - width : i], in_rows[v + 1 < height ? i + width : i]));
-    }
-  }
+  const auto for_each_pixel = [&](const auto& use) {
+    parallel_for(height, control.threads, [&](int v) {
+      if (control.interrupted()) return;
+      for (int u = 0; u < width; ++u) use(u, v, v * width + u);
+    });
+  };
+  for_each_pixel([&](int u, int, int i) {
+    in_rows[i] = pick(values[i], pick(values[i - (u > 0 ? 1 : 0)], values[i + (u + 1 < width ? 1 : 0)]));
+  });
+  for_each_pixel([&](int, int v, int i) {
+    result[i] = pick(in_rows[i], pick(in_rows[v > 0 ? i - width : i], in_rows[v + 1 < height ? i + width : i]));
+  });
   return result;
 }
 
@@ -43,19 +48,19 @@ double hidden_share(const SensorView& view, const DepthMap& map) {
   return static_cast<double>(hidden) / static_cast<double>(std::max<std::size_t>(1, count));
 }
 
-void hide_behind_gaps(DepthMap& map) {
+void hide_behind_gaps(DepthMap& map, const RunControl& control) {
   std::vector<float> nearness(map.pixels.size(), 0);
   for (std::size_t i = 0; i < nearness.size(); ++i) {
     if (map.measured(static_cast<int>(i))) nearness[i] = 1 / map.pixels[i].position.z();
   }
-  const auto widen = [&](const std::vector<float>& values, auto pick) {
-    return over_neighbours(values, map.width, map.height, pick);
-  };
-  const std::vector<float> closed = widen(widen(nearness, [](float a, float b) { return std::max(a, b); }),
-                                          [](float a, float b) { return std::min(a, b); });
+  const auto larger = [](float a, float b) { return std::max(a, b); };
+  const auto smaller = [](float a, float b) { return std::min(a, b); };
+  const std::vector<float> closed =
+      over_neighbours(over_neighbours(nearness, map, larger, control), map, smaller, control);
+  if (control.interrupted()) return;
   for (std::size_t i = 0; i < closed.size(); ++i) {
-    Eigen::Vector3f& p = map.pixels[i].position;
-    if (closed[i] * (p.z() - kBehindClosing * map.pixel_size) > 1) map.pixels[i] = {{0, 0, 0}, {0, 0, 0}};
+    const float z = map.pixels[i].position.z();
+    if (closed[i] * (z - kBehindClosing * map.pixel_size) > 1) map.pixels[i] = {{0, 0, 0}, {0, 0, 0}};
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/geometry/depth_map.h"
+#include "core/run_control.h"
 
 namespace binpose {
 
@@ -9,7 +10,8 @@ namespace binpose {
 double hidden_share(const SensorView& view, const DepthMap& map);
 
 /// Takes away what shows through gaps of a nearer surface: a pixel clearly behind the morphological closing (3 x 3) of
-/// the map's nearness, which bridges gaps of less than three pixels and leaves planes as they are.
-void hide_behind_gaps(DepthMap& map);
+/// the map's nearness, which bridges gaps of less than three pixels and leaves planes as they are. Does nothing when
+/// `control` interrupts.
+void hide_behind_gaps(DepthMap& map, const RunControl& control = {});
 
 }  // namespace binpose
