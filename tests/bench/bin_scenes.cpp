@@ -209,8 +209,9 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
     for (std::size_t h = 0; h < result->hypotheses.size() && dump; ++h) {
       const PoseHypothesis& p = result->hypotheses[h];
       int right = 0;
-      for (const Pose& v : p.variants)
-        for (const SceneInstance& i : scene.instances) right += judge.right(v, i.T_scene_model);
+      for (const Pose& variant : p.variants) {
+        for (const SceneInstance& i : scene.instances) right += judge.right(variant, i.T_scene_model) ? 1 : 0;
+      }
       print_hypothesis(scene.name, verdicts[h], p, right);
     }
     const DetectStats& s = result->stats;

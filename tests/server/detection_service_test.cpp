@@ -46,7 +46,10 @@ TEST_F(DetectionServiceTest, FindsThePartAndAnswersInTheUnitOfTheCloud) {
   for (const v1::DetectResponse& answer : answers) ASSERT_GE(answer.hypotheses_size(), 1) << answer.DebugString();
   const v1::PoseHypothesis& best = answers[0].hypotheses(0);
   EXPECT_EQ(best.model_id(), "block");
+  // All but certain of the surface, though from here the block could lie the other way round.
+  EXPECT_GT(best.score(), 0.5 * best.confidence());
   EXPECT_GT(best.score(), 0.4);
+  EXPECT_GT(best.variants_size(), 0);
   EXPECT_NEAR(best.pose().position().x(), -20, 2);
   EXPECT_NEAR(best.pose().position().y(), -15, 2);
   EXPECT_NEAR(best.pose().position().z(), 400, 2);

@@ -1,9 +1,12 @@
 #include "tests/support/scan_map.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include "core/geometry/contours.h"
 #include "core/geometry/normals.h"
+#include "core/train/sample_surface.h"
 #include "core/train/train.h"
 
 namespace binpose::testing {
@@ -24,6 +27,22 @@ DepthMap scan_map(const PointCloud& cloud, double diameter) {
 
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter) {
   return scan_map(render(bodies, sensor), diameter);
+}
+
+PointCloud scattered(std::vector<Eigen::Vector3f> points) {
+  PointCloud cloud;
+  cloud.width = static_cast<std::uint32_t>(points.size());
+  cloud.height = 1;
+  cloud.points = std::move(points);
+  return cloud;
+}
+
+PointCloud all_sides(const Mesh& mesh, const Pose& T_scene_model, double spacing) {
+  std::vector<Eigen::Vector3f> points;
+  for (const SurfacePoint& point : thin_evenly(scatter(mesh, spacing / 4), spacing)) {
+    points.emplace_back((T_scene_model * point.position.cast<double>()).cast<float>());
+  }
+  return scattered(std::move(points));
 }
 
 PinholeSensor bin_sensor() {

@@ -16,6 +16,12 @@ Model quick_model(const Mesh& mesh);
 DepthMap scan_map(const PointCloud& cloud, double diameter);
 DepthMap scan_map(std::span<const PlacedMesh> bodies, const PinholeSensor& sensor, double diameter);
 
+/// Points in no order.
+PointCloud scattered(std::vector<Eigen::Vector3f> points);
+
+/// Points all over a part's surface, `spacing` metres apart: what no single sensor sees.
+PointCloud all_sides(const Mesh& mesh, const Pose& T_scene_model, double spacing);
+
 /// A sensor with the noise of a good scanner, for scenes of several parts.
 PinholeSensor bin_sensor();
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <thread>
 
-#include "core/train/sample_surface.h"
 #include "core/train/train.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
@@ -128,17 +127,10 @@ TEST(Detect, DoesNotNeedTheOrderOfThePoints) {
 
 TEST(Detect, FindsAPartInACloudOfAllItsSides) {
   const Model model = testing::quick_model(testing::l_block());
-  const double spacing = 0.01 * model.diameter;
-  const std::vector<SurfacePoint> surface = thin_evenly(scatter(testing::l_block(), spacing / 4), spacing);
   const std::vector<testing::PlacedMesh> blocks = four_blocks();
   for (const int i : {0, 2, 3}) {  // with nothing around, the other looks the same turned by 180 degrees
     const Pose& truth = blocks[i].T_scene_mesh;
-    PointCloud cloud;
-    for (const SurfacePoint& point : surface) {
-      cloud.points.emplace_back((truth * point.position.cast<double>()).cast<float>());
-    }
-    cloud.width = static_cast<std::uint32_t>(cloud.points.size());
-    cloud.height = 1;
+    const PointCloud cloud = testing::all_sides(testing::l_block(), truth, 0.01 * model.diameter);
     const DetectResult result = *search(cloud, model);
     ASSERT_FALSE(result.hypotheses.empty());
     EXPECT_TRUE(right(result.hypotheses.front(), truth, model));

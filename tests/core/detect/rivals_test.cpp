@@ -34,8 +34,7 @@ DetectResult detected(const testing::PartScan& scan) {
   testing::PinholeSensor sensor;
   sensor.noise = 1e-4;
   const Model* models[] = {&scan.model};
-  DetectParams params;
-  return *detect(testing::render(scan.bodies, sensor), models, params, {});
+  return *detect(testing::render(scan.bodies, sensor), models, {}, {});
 }
 
 TEST(Rivals, AreThePosesThatShowTheSameFromAPlainSide) {

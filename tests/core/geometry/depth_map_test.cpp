@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "tests/scenes/random.h"
-#include "tests/support/ray_cast.h"
+#include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
 
 namespace binpose {
@@ -18,14 +18,6 @@ using Eigen::Vector3f;
 using ::testing::HasSubstr;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-PointCloud unordered(std::vector<Vector3f> points) {
-  PointCloud cloud;
-  cloud.width = static_cast<std::uint32_t>(points.size());
-  cloud.height = 1;
-  cloud.points = std::move(points);
-  return cloud;
-}
 
 PointCloud block_over_floor() {
   Pose T_scene_part = Pose::Identity();
@@ -61,8 +53,8 @@ TEST(SensorView, MeasuresTheSpacingOfAGrid) {
 }
 
 TEST(SensorView, LeavesOutWhatWasNotMeasuredOrLiesBehindTheSensor) {
-  const absl::StatusOr<SensorView> view = sensor_view(
-      unordered({{0, 0, 0.5F}, {kNan, 0, 0.5F}, {0, 0, INFINITY}, {0, 0, -0.5F}, {0.01F, 0, 0.5F}, {0, 0.01F, 0.6F}}));
+  const absl::StatusOr<SensorView> view = sensor_view(testing::scattered(
+      {{0, 0, 0.5F}, {kNan, 0, 0.5F}, {0, 0, INFINITY}, {0, 0, -0.5F}, {0.01F, 0, 0.5F}, {0, 0.01F, 0.6F}}));
   ASSERT_TRUE(view.ok());
   EXPECT_EQ(view->points.size(), 3u);
 }
@@ -74,20 +66,21 @@ struct Refused {
 };
 
 TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
-  PointCloud wrong_size = unordered({{0, 0, 1}, {0, 0, 2}});
+  PointCloud wrong_size = testing::scattered({{0, 0, 1}, {0, 0, 2}});
   wrong_size.height = 2;
-  PointCloud huge_size = unordered({{0, 0, 1}});
+  PointCloud huge_size = testing::scattered({{0, 0, 1}});
   huge_size.width = huge_size.height = 0xFFFFFFFF;
-  PointCloud lost_sensor = unordered({{0, 0, 1}});
+  PointCloud lost_sensor = testing::scattered({{0, 0, 1}});
   lost_sensor.sensor_position.x() = kNan;
-  PointCloud few_normals = unordered({{0, 0, 1}, {0, 0, 2}});
+  PointCloud few_normals = testing::scattered({{0, 0, 1}, {0, 0, 2}});
   few_normals.normals = {{0, 0, -1}};
   const Refused cases[] = {
       {"size", wrong_size, "2 points; width x height is 2 x 2 = 4"},
       {"huge size", huge_size, "1 points; width x height is"},
-      {"empty", unordered({}), "0 points"},
-      {"no measurement", unordered({{kNan, kNan, kNan}, {INFINITY, 0, 1}}), "no measurement among its 2 points"},
-      {"all in the sensor", unordered({{0, 0, 0}, {0, 0, 0}}), "no measurement among its 2 points"},
+      {"empty", testing::scattered({}), "0 points"},
+      {"no measurement", testing::scattered({{kNan, kNan, kNan}, {INFINITY, 0, 1}}),
+       "no measurement among its 2 points"},
+      {"all in the sensor", testing::scattered({{0, 0, 0}, {0, 0, 0}}), "no measurement among its 2 points"},
       {"sensor position", lost_sensor, "sensor_position"},
       {"normals", few_normals, "1 normals for 2 points"},
   };
@@ -123,7 +116,7 @@ DepthMap wall_with_a_hole(int step_column, float step) {
       }
     }
   }
-  return depth_map(*sensor_view(unordered(points)), 0.004);
+  return depth_map(*sensor_view(testing::scattered(points)), 0.004);
 }
 
 int measured_count(const DepthMap& map) {
@@ -151,7 +144,7 @@ TEST(DepthMap, HasPixelsOfTheWantedSize) {
 
 TEST(DepthMap, OfPointsFarApartStaysSmall) {
   for (const float reach : {1e3F, 1e30F}) {
-    const SensorView view = *sensor_view(unordered(
+    const SensorView view = *sensor_view(testing::scattered(
         {{0, 0, 1e-3F}, {2e-3F, 0, 1e-3F}, {0, 2e-3F, 1e-3F}, {reach, 0, reach}, {0, reach, reach}, {0, 0, reach}}));
     const DepthMap map = depth_map(view, 0.001);
     EXPECT_LE(map.pixels.size(), 4'500'000u) << reach;
@@ -160,7 +153,7 @@ TEST(DepthMap, OfPointsFarApartStaysSmall) {
 }
 
 TEST(DepthMap, KeepsGivenNormalsTurnedToTheSensorAndDropsSpoiltOnes) {
-  PointCloud cloud = unordered({{-0.1F, 0, 1}, {0, 0, 1}, {0.1F, 0, 1}});
+  PointCloud cloud = testing::scattered({{-0.1F, 0, 1}, {0, 0, 1}, {0.1F, 0, 1}});
   cloud.normals = {{0, 0, -1}, {0, 0, 2}, {kNan, 0, 1}};
   const SensorView view = *sensor_view(cloud);
   const DepthMap map = depth_map(view, 0.05);

@@ -4,37 +4,18 @@
 
 #include <cmath>
 
-#include "core/train/sample_surface.h"
-#include "tests/support/ray_cast.h"
+#include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
 
 namespace binpose {
 namespace {
 
-const Eigen::Vector3f kPlace(0.02F, -0.01F, 0.5F);
-
-PointCloud scattered(std::vector<Eigen::Vector3f> points) {
-  PointCloud cloud;
-  cloud.width = static_cast<std::uint32_t>(points.size());
-  cloud.height = 1;
-  cloud.points = std::move(points);
-  return cloud;
-}
-
-/// Points all over a block in the sensor's view, `spacing` apart.
-SensorView all_sides(float spacing) {
-  std::vector<Eigen::Vector3f> points;
-  for (const SurfacePoint& point : thin_evenly(scatter(testing::l_block(), spacing / 4), spacing)) {
-    points.push_back(point.position + kPlace);
-  }
-  return sensor_view(scattered(std::move(points))).value();
-}
+const Pose kPlace(Eigen::Translation3d(0.02, -0.01, 0.5));
 
 SensorView one_side() {
-  testing::PlacedMesh block{testing::l_block(), Pose::Identity()};
-  block.T_scene_mesh.translation() = kPlace.cast<double>();
+  const testing::PlacedMesh block{testing::l_block(), kPlace};
   PointCloud scan = testing::render({&block, 1}, {});
-  return sensor_view(scattered(std::move(scan.points))).value();
+  return sensor_view(testing::scattered(std::move(scan.points))).value();
 }
 
 int count_measured(const DepthMap& map) {
@@ -44,7 +25,7 @@ int count_measured(const DepthMap& map) {
 }
 
 TEST(HiddenSurfaces, AreManyWhereACloudHoldsAllSidesAndFewInAScan) {
-  const SensorView all = all_sides(0.003F), one = one_side();
+  const SensorView all = sensor_view(testing::all_sides(testing::l_block(), kPlace, 0.003)).value(), one = one_side();
   EXPECT_GT(hidden_share(all, depth_map(all, 1.2 * all.spacing)), 0.2);
   EXPECT_LT(hidden_share(one, depth_map(one, 1.2 * one.spacing)), 0.05);
 }
@@ -59,7 +40,7 @@ TEST(HiddenSurfaces, DoNotShowThroughGapsOfNearerOnes) {
       if (x % 2 == 0 && y % 2 == 0) points.emplace_back(0.002F * u, 0.002F * v, 0.5F);
     }
   }
-  DepthMap map = depth_map(sensor_view(scattered(std::move(points))).value(), 0.0022);
+  DepthMap map = depth_map(sensor_view(testing::scattered(std::move(points))).value(), 0.0022);
   const auto count_far = [&] {
     int far = 0;
     for (const SurfacePoint& pixel : map.pixels) far += pixel.position.z() > 0.52F ? 1 : 0;
@@ -79,7 +60,7 @@ TEST(HiddenSurfaces, AreNoneOnOneSlantedSurfaceOrBehindAWideHole) {
       points.emplace_back(0.002F * u, 0.002F * v, 0.5F + 0.002F * u + (in_hole ? 0.03F : 0.0F));
     }
   }
-  DepthMap map = depth_map(sensor_view(scattered(std::move(points))).value(), 0.0022);
+  DepthMap map = depth_map(sensor_view(testing::scattered(std::move(points))).value(), 0.0022);
   const int before = count_measured(map);
   hide_behind_gaps(map);
   EXPECT_GT(count_measured(map), 0.97 * before);
