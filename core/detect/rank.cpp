@@ -1,59 +1,33 @@
 #include "core/detect/rank.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <map>
 #include <numeric>
+#include <optional>
 
+#include "core/detect/ownership.h"
 #include "core/detect/rivals.h"
 #include "core/parallel.h"
 
 namespace binpose {
 namespace {
 
-constexpr int kNobody = -1;
-constexpr float kInFront = 0.02F;  // diameters
-constexpr double kTrace = 0.02;    // of the visible surface
 /// Share of a pose's score that another must have to be worth comparing.
 constexpr float kRivalShare = 0.6F;
+/// Candidates per thread among which some to judge beside the first are looked for.
+constexpr std::size_t kAhead = 8;
 
-/// Marks the pixels that a pose explains: those around each visible model point that measure the same surface.
-void own_pixels(const DepthMap& map, const Model& model, const Candidate& candidate, float tolerance, int index,
-                std::vector<int>& owner) {
-  for (const std::uint16_t point : visible_points(model, candidate.T_view_model)) {
-    const Eigen::Vector3f p = candidate.T_view_model * model.surface[point].position;
-    const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
-    if (pixel < 0) continue;
-    const Eigen::Vector3f normal = candidate.T_view_model.linear() * model.surface[point].normal;
-    const int u = pixel % map.width, v = pixel / map.width;
-    for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
-      for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
-        const int i = row * map.width + column;
-        if (owner[i] == index || !map.measured(i)) continue;
-        if (std::abs(normal.dot(map.pixels[i].position - p)) <= tolerance) owner[i] = index;
-      }
-    }
-  }
-}
+/// What a candidate is worth beside those accepted before.
+struct Judgement {
+  Candidate candidate;
+  Eigen::AlignedBox2i box;     // of the pixels that it was judged by
+  std::size_t accepted_count;  // of those before
+};
 
-/// The owners of what lies in front of a pose's surface, where they hide more than a trace of it.
-std::vector<int> find_occluders(const DepthMap& map, const Model& model, const Candidate& candidate, int index,
-                                const std::vector<int>& owner) {
-  std::map<int, int> hidden_by;
-  const std::vector<std::uint16_t>& visible = visible_points(model, candidate.T_view_model);
-  for (const std::uint16_t i : visible) {
-    const Eigen::Vector3f p = candidate.T_view_model * model.surface[i].position;
-    const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
-    if (pixel < 0 || owner[pixel] == kNobody || owner[pixel] == index) continue;
-    const bool hidden = map.pixels[pixel].position.z() < p.z() - kInFront * static_cast<float>(model.diameter);
-    if (hidden) ++hidden_by[owner[pixel]];
-  }
-  std::vector<int> occluders;
-  for (const auto& [other, count] : hidden_by) {
-    if (count > kTrace * static_cast<double>(visible.size())) occluders.push_back(other);
-  }
-  return occluders;
+Eigen::AlignedBox3f box_of(const std::vector<SurfacePoint>& surface) {
+  Eigen::AlignedBox3f box;
+  for (const SurfacePoint& point : surface) box.extend(point.position);
+  return box;
 }
 
 /// Candidates in line for acceptance, best first.
@@ -71,7 +45,8 @@ class Line {
         is_absent_(models.size(), false) {
     std::stable_sort(first_.begin(), first_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
-    choose_variants();
+    for (const Model* model : models) surface_boxes_.push_back(box_of(model->surface));
+    for (const Candidate& candidate : first_) boxes_.push_back(box_in_image(candidate));
     start_anew();
   }
 
@@ -84,10 +59,13 @@ class Line {
         passed_over_.push_back(order_[next_++]);
         continue;
       }
+      if (!is_judged(order_[next_])) judge_ahead(min_score);
       if (!stands_firm()) continue;
       const Candidate& candidate = candidates_[order_[next_++]];
       own_pixels(map_, *models_[candidate.model_index], candidate,
-                 options_.verification[candidate.model_index].tolerance, accepted_count_++, owner_);
+                 options_.verification[candidate.model_index].tolerance, static_cast<int>(accepted_boxes_.size()),
+                 owner_);
+      accepted_boxes_.push_back(box_in_image(candidate));
       accepted.push_back(candidate);
     }
     return accepted;
@@ -112,26 +90,23 @@ class Line {
  private:
   void start_anew() {
     candidates_ = first_;
+    judgements_.assign(candidates_.size(), std::nullopt);
     order_.resize(candidates_.size());
     std::iota(order_.begin(), order_.end(), 0);
     next_ = 0;
     passed_over_.clear();
-    accepted_count_ = 0;
+    accepted_boxes_.clear();
     owner_.assign(map_.pixels.size(), kNobody);
+  }
+
+  Eigen::AlignedBox2i box_in_image(const Candidate& candidate) const {
+    return image_box(map_, surface_boxes_[candidate.model_index], candidate.T_view_model);
   }
 
   VariantChoice variant_of(const Candidate& candidate) const {
     return choose_variant(
         map_, *models_[candidate.model_index], candidate.T_view_model, options_.verification[candidate.model_index],
         [&](const Eigen::Isometry3f& T_view_model) { return options_.allowed(candidate.model_index, T_view_model); });
-  }
-
-  /// Of all that will stand first, in parallel: the choice does not depend on what others own.
-  void choose_variants() {
-    parallel_for(static_cast<int>(first_.size()), control_.threads, [&](int i) {
-      if (first_[i].score() < options_.min_score || control_.stop.stop_requested()) return;
-      variants_[i] = variant_of(first_[i]);
-    });
   }
 
   /// Compares a candidate with all that are nearly as good; others' pixels don't matter.
@@ -147,26 +122,58 @@ class Line {
                         options_.verification[candidate.model_index]);
   }
 
-  /// Judges the first in line anew; sends it back to its place if it lost pixels to a better one or is less sure
-  /// than it seemed.
-  bool stands_firm() {
-    const int i = order_[next_];
-    Candidate& candidate = candidates_[i];
-    const Model& model = *models_[candidate.model_index];
-    const VerifyOptions& options = options_.verification[candidate.model_index];
+  /// Judges a candidate anew, without the pixels of those accepted. May run beside the judging of others.
+  Judgement judge(int i) {
+    Candidate candidate = candidates_[i];
     const float before = candidate.score();
     if (!variants_[i]) variants_[i] = variant_of(first_[i]);
     candidate.T_view_model = variants_[i]->T_view_model;
     candidate.confidence = variants_[i]->confidence;
     candidate.rivals = variants_[i]->rivals;
-    candidate.evidence = verify(map_, model, candidate.T_view_model, options, &owner_);
+    candidate.evidence = verify(map_, *models_[candidate.model_index], candidate.T_view_model,
+                                options_.verification[candidate.model_index], &owner_);
     // Few get so far: the doubles have lost their pixels.
     if (!rivalries_[i] && candidate.score() >= before) rivalries_[i] = rivalry_of(candidate);
     if (rivalries_[i]) {
       candidate.confidence = 1 / (1 / candidate.confidence + rivalries_[i]->odds);
       candidate.rivals.insert(candidate.rivals.end(), rivalries_[i]->rivals.begin(), rivalries_[i]->rivals.end());
     }
-    if (candidate.score() >= before) return true;
+    const Eigen::AlignedBox2i box = box_in_image(candidate);
+    return {std::move(candidate), box, accepted_boxes_.size()};
+  }
+
+  /// Whether a candidate was judged and nothing was accepted since that could own a pixel that it was judged by.
+  bool is_judged(int i) const {
+    const std::optional<Judgement>& judgement = judgements_[i];
+    return judgement && std::all_of(accepted_boxes_.begin() + static_cast<std::ptrdiff_t>(judgement->accepted_count),
+                                    accepted_boxes_.end(),
+                                    [&](const Eigen::AlignedBox2i& box) { return !box.intersects(judgement->box); });
+  }
+
+  /// Judges the first in line, and on other threads some that come soon and have pixels of their own.
+  void judge_ahead(double min_score) {
+    const auto threads = static_cast<std::size_t>(control_.threads);
+    const std::size_t last = std::min(order_.size(), next_ + kAhead * threads);
+    std::vector<int> batch = {order_[next_]};
+    for (std::size_t k = next_ + 1; k < last && batch.size() < threads; ++k) {
+      const int i = order_[k];
+      if (candidates_[i].score() < min_score) break;
+      const bool alone =
+          std::none_of(batch.begin(), batch.end(), [&](int j) { return boxes_[i].intersects(boxes_[j]); });
+      if (alone && !is_absent_[candidates_[i].model_index] && !is_judged(i)) batch.push_back(i);
+    }
+    parallel_for(static_cast<int>(batch.size()), control_.threads,
+                 [&](int k) { judgements_[batch[k]] = judge(batch[k]); });
+  }
+
+  /// Takes the judgement of the first in line; sends it back to its place if it lost pixels to a better one or is less
+  /// sure than it seemed.
+  bool stands_firm() {
+    const int i = order_[next_];
+    const float before = candidates_[i].score();
+    candidates_[i] = std::move(judgements_[i]->candidate);
+    judgements_[i].reset();
+    if (candidates_[i].score() >= before) return true;
     const auto first = order_.begin() + static_cast<std::ptrdiff_t>(next_);
     std::rotate(first, first + 1, std::upper_bound(first + 1, order_.end(), i, [&](int a, int b) {
                   return candidates_[a].score() > candidates_[b].score();
@@ -178,15 +185,18 @@ class Line {
   const std::span<const Model* const> models_;
   const RankOptions& options_;
   const RunControl& control_;
+  std::vector<Eigen::AlignedBox3f> surface_boxes_;      // of each model
   std::vector<Candidate> first_;                        // as they came, best first
+  std::vector<Eigen::AlignedBox2i> boxes_;              // of each candidate as it came
   std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen already
   std::vector<std::optional<Rivalry>> rivalries_;       // the same
   std::vector<bool> is_absent_;                         // per model: none of it is accepted
   std::vector<Candidate> candidates_;                   // as judged so far
+  std::vector<std::optional<Judgement>> judgements_;    // not taken yet
   std::vector<int> order_;                              // of the candidates
   std::size_t next_ = 0;
   std::vector<int> passed_over_;  // best first
-  int accepted_count_ = 0;
+  std::vector<Eigen::AlignedBox2i> accepted_boxes_;
   std::vector<int> owner_;
 };
 
