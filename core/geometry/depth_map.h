@@ -5,9 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "absl/status/statusor.h"
-#include "core/geometry/point_cloud.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/sensor_view.h"
 #include "core/geometry/surface_point.h"
 #include "core/run_control.h"
 
@@ -47,28 +46,6 @@ struct DepthMap {
     return static_cast<int>(v) * width + static_cast<int>(u);
   }
 };
-
-/// The box of x/z and y/z that points fall into.
-struct TangentBox {
-  float low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY;
-};
-
-TangentBox window_of(const std::vector<Eigen::Vector3f>& points);
-
-/// The measured points of a cloud, seen from its sensor.
-struct SensorView {
-  Pose T_scene_view = Pose::Identity();
-  std::vector<Eigen::Vector3f> points;   ///< in front of the sensor, view frame
-  std::vector<Eigen::Vector3f> normals;  ///< of the points, or empty
-  TangentBox window;                     ///< of the points
-  float median_depth = 0;                ///< metres
-  float spacing = 0;                     ///< typical distance of neighbouring points across the view, metres
-  bool is_grid = false;                  ///< an image's points, row by row; else scattered
-};
-
-/// Errors: INVALID_ARGUMENT when width x height does not fit the points, when no point is finite, or when none lies in
-/// front of the sensor; CANCELLED.
-absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl& control = {});
 
 /// Projects the points to pixels of `pixel_size` metres at the median depth (or larger ones, so that the image has at
 /// most 4 million). Normals that came with the cloud are kept, otherwise none are set. A stop leaves pixels unmeasured.

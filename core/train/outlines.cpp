@@ -41,11 +41,11 @@ std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> de
     for (const SurfacePoint& point : dense) {
       const float cosine = point.normal.dot(viewpoints[k]);
       view.points.push_back(T_view_model * point.position);
+      view.window.extend(view.points.back());
       // What a sensor sees too steeply hides what is behind it, but shows no contour.
       view.normals.push_back(cosine > kGrazingCosine ? Eigen::Vector3f(T_view_model.linear() * point.normal)
                                                      : Eigen::Vector3f::Zero());
     }
-    view.window = window_of(view.points);
     DepthMap map = depth_map(view, pixel, control);
     find_contours(map, static_cast<float>(step), Unmeasured::kFar);
     views[k] = std::move(map.contours);
