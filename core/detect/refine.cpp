@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/detect/outline_block.h"
 #include "core/detect/point_block.h"
 #include "core/detect/verify.h"
 #include "core/geometry/pose.h"
@@ -24,42 +25,33 @@ struct NormalEquations {
   float A[6][6] = {};  // lower triangle
   float b[6] = {};
   int rows = 0;
-
-  /// Draws the point at `arm` from the pivot by `distance` along the unit vector `direction`; `gate` is where the pull
-  /// of Tukey's biweight ends.
-  void add(const Eigen::Vector3f& arm, const Eigen::Vector3f& direction, float distance, float gate, float weight) {
-    const float relative = distance / gate;
-    weight *= (1 - relative * relative) * (1 - relative * relative);
-    const Eigen::Vector3f turned = arm.cross(direction);
-    const float row[6] = {turned[0], turned[1], turned[2], direction[0], direction[1], direction[2]};
-    for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c <= r; ++c) A[r][c] += weight * row[r] * row[c];
-      b[r] += weight * distance * row[r];
-    }
-    ++rows;
-  }
 };
 
 /// Normal equations of eight points at a time.
 struct LaneEquations {
   Lanes A[6][6] = {}, b[6] = {}, rows = {};
 
-  [[gnu::always_inline]] void add(const PointBlock& p, const Eigen::Vector3f& pivot, float gate) {
-    const LanePoints offset = p.scene_point - p.point;
-    const LanePoints& n = p.scene_normal;
-    const Lanes distance = dot(n, offset);
-    const LaneInts matches = (p.scene_point.z > 0) & (n.z != 0) & (magnitude(distance) <= gate) &
-                             (dot(offset, offset) <= 4 * gate * gate) & (dot(n, p.normal) >= kNormalCosine);
+  /// Draws the points at `arm` from the pivot by `distance` along the unit vectors `n`, those that have a match; `gate`
+  /// is where the pull of Tukey's biweight ends.
+  [[gnu::always_inline]] void add(const LanePoints& arm, const LanePoints& n, const Lanes& distance,
+                                  const LaneInts& matches, float gate, float most) {
     const Lanes zero = {}, relative = distance * (1 / gate), pull = 1 - relative * relative;
-    const Lanes weight = matches ? pull * pull : zero;
-    const Lanes x = p.point.x - pivot.x(), y = p.point.y - pivot.y(), z = p.point.z - pivot.z();
-    const Lanes row[6] = {y * n.z - z * n.y, z * n.x - x * n.z, x * n.y - y * n.x, n.x, n.y, n.z};
+    const Lanes weight = matches ? most * pull * pull : zero;
+    const Lanes row[6] = {
+        arm.y * n.z - arm.z * n.y, arm.z * n.x - arm.x * n.z, arm.x * n.y - arm.y * n.x, n.x, n.y, n.z};
     for (int r = 0; r < 6; ++r) {
       const Lanes weighted = weight * row[r];
       for (int c = 0; c <= r; ++c) A[r][c] += weighted * row[c];
       b[r] += weighted * distance;
     }
     rows += matches ? zero + 1 : zero;
+  }
+  void add_to(NormalEquations& equations) const {
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c <= r; ++c) equations.A[r][c] += sum_of(A[r][c]);
+      equations.b[r] += sum_of(b[r]);
+    }
+    equations.rows += static_cast<int>(sum_of(rows));
   }
 };
 
@@ -73,47 +65,58 @@ void add_surface(const DepthMap& map, const Model& model, std::span<const std::u
   for (std::size_t first = 0; first < points.size(); first += kLanes) {
     block.load(model.surface, points.subspan(first), T_view_model);
     block.look_up(map);
-    sums.add(block, pivot, gate);
+    const LanePoints offset = block.scene_point - block.point;
+    const LanePoints& n = block.scene_normal;
+    const Lanes distance = dot(n, offset);
+    const LaneInts matches = (block.scene_point.z > 0) & (n.z != 0) & (magnitude(distance) <= gate) &
+                             (dot(offset, offset) <= 4 * gate * gate) & (dot(n, block.normal) >= kNormalCosine);
+    sums.add(block.point - pivot, n, distance, matches, gate, 1);
   }
-  for (int r = 0; r < 6; ++r) {
-    for (int c = 0; c <= r; ++c) equations.A[r][c] += sum_of(sums.A[r][c]);
-    equations.b[r] += sum_of(sums.b[r]);
-  }
-  equations.rows += static_cast<int>(sum_of(sums.rows));
+  sums.add_to(equations);
 }
 
-/// The scene's contour nearest to an outline point along its outward direction, or null.
-const ContourPoint* matching_contour(const DepthMap& map, const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
-                                     const Eigen::Vector3f& outward, float gate) {
+/// How far outward of each outline point of a block the scene's nearest contour along that direction lies; `found` says
+/// where there is one.
+[[gnu::always_inline]] inline Lanes distance_to_contour(const DepthMap& map, const OutlineBlock& block, float gate,
+                                                        LaneInts& found) {
   const int reach = std::max(1, static_cast<int>(gate / map.pixel_size));
-  for (int k = 0; k <= 2 * reach; ++k) {
+  Lanes distance = {};
+  LaneInts open = block.point.z > 0;
+  for (int k = 0; k <= 2 * reach && bits_of(open) != 0; ++k) {
     const int step = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
-    const Eigen::Vector3f q = p + static_cast<float>(step) * map.pixel_size * outward;
-    const int pixel = q.z() > 0 ? map.pixel_of(q) : -1;
-    if (pixel < 0 || map.contour_at[pixel] < 0) continue;
-    const ContourPoint& contour = map.contours[map.contour_at[pixel]];
-    if (contour.outward.dot(outward) > kOutwardCosine && std::abs(normal.dot(contour.position - p)) < gate) {
-      return &contour;
-    }
+    const LaneInts pixel = pixels_of(map, block.moved(static_cast<float>(step) * map.pixel_size));
+    for_each_set(open & (pixel >= 0), kLanes, [&](int i) {
+      const int at = map.contour_at[pixel[i]];
+      if (at < 0) return;
+      const ContourPoint& contour = map.contours[at];
+      const Eigen::Vector3f outward(block.outward.x[i], block.outward.y[i], block.outward.z[i]);
+      const Eigen::Vector3f normal(block.normal.x[i], block.normal.y[i], block.normal.z[i]);
+      const Eigen::Vector3f offset =
+          contour.position - Eigen::Vector3f(block.point.x[i], block.point.y[i], block.point.z[i]);
+      if (!(contour.outward.dot(outward) > kOutwardCosine && std::abs(normal.dot(offset)) < gate)) return;
+      distance[i] = outward.dot(offset);
+      open[i] = 0;
+    });
   }
-  return nullptr;
+  found = (block.point.z > 0) & ~open & (magnitude(distance) < gate);
+  return distance;
 }
 
 /// Draws each outline point to where the scene's surface ends. Planes leave a flat part free to slide; its rim does
 /// not.
+BINPOSE_VECTORISED
 void add_outline(const DepthMap& map, const std::vector<ContourPoint>& outline, const Eigen::Isometry3f& T_view_model,
                  const Eigen::Vector3f& pivot, float gate, int stride, NormalEquations& equations) {
   const float weight = kOutlineWeight * static_cast<float>(stride);
-  for (std::size_t i = 0; i < outline.size(); i += stride) {
-    const ContourPoint& point = outline[i];
-    const Eigen::Vector3f p = T_view_model * point.position;
-    if (!(p.z() > 0)) continue;
-    const Eigen::Vector3f outward = T_view_model.linear() * point.outward;
-    const ContourPoint* contour = matching_contour(map, p, T_view_model.linear() * point.normal, outward, gate);
-    if (contour == nullptr) continue;
-    const float distance = outward.dot(contour->position - p);
-    if (std::abs(distance) < gate) equations.add(p - pivot, outward, distance, gate, weight);
+  LaneEquations sums;
+  OutlineBlock block;
+  for (std::size_t first = 0; first < outline.size(); first += static_cast<std::size_t>(kLanes) * stride) {
+    block.load(outline, first, stride, T_view_model);
+    LaneInts found;
+    const Lanes distance = distance_to_contour(map, block, gate, found);
+    sums.add(block.point - pivot, block.outward, distance, found, gate, weight);
   }
+  sums.add_to(equations);
 }
 
 /// The lower triangle, mirrored.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/detect/outline_block.h"
 #include "core/detect/point_block.h"
 
 namespace binpose {
@@ -27,44 +28,21 @@ constexpr float kFinePixel = 0.021F;
 constexpr float kOutside = 2.0F;
 constexpr float kInside = 1.0F;
 
-/// Outline points under a pose, eight at a time.
-struct OutlineBlock {
-  LanePoints point, normal, outward;
-
-  /// Takes `count` points, `stride` apart; the other lanes get z = -1.
-  [[gnu::always_inline]] void load(const ContourPoint* source, int count, int stride,
-                                   const Eigen::Isometry3f& T_view_model) {
-    LaneBuffer positions, normals, outwards;
-    for (int i = 0; i < kLanes; ++i) {
-      const ContourPoint& contour = source[i < count ? i * stride : 0];
-      positions.set(i, contour.position);
-      normals.set(i, contour.normal);
-      outwards.set(i, contour.outward);
-    }
-    point = transform(T_view_model, positions.load());
-    normal = rotate(T_view_model, normals.load());
-    outward = rotate(T_view_model, outwards.load());
-    for (int i = count; i < kLanes; ++i) point.z[i] = -1;
-  }
-
-  /// How far the scene lies behind the surface carried on by `distance` along `outward`, metres; `measured` says where
-  /// that is known. At a rounded side the tangent plane runs along the ray: it is carried on at most at `steepest`.
-  [[gnu::always_inline]] Lanes depth_behind(const DepthMap& map, float distance, float steepest,
-                                            LaneInts& measured) const {
-    const LanePoints q = {point.x + distance * outward.x, point.y + distance * outward.y,
-                          point.z + distance * outward.z};
-    const LaneInts pixel = pixels_of(map, q);
-    Lanes depth = {};
-    for (int i = 0; i < kLanes; ++i) depth[i] = map.pixels[std::max(0, pixel[i])].position.z();
-    measured = (pixel >= 0) & (depth > 0) & (point.z > 0);
-    const Lanes zero = {}, one = zero + 1;
-    const Lanes towards = -normal.z > 0.05F ? -normal.z : zero + 0.05F;
-    Lanes slope = dot(normal, outward) / towards;
-    slope = slope > steepest ? zero + steepest : slope;
-    slope = slope < -steepest ? zero - steepest : slope;
-    return (depth - point.z - slope * distance) / root(one + slope * slope);
-  }
-};
+/// How far the scene lies behind the surface carried on by `distance` along `outward`, metres; `measured` says where
+/// that is known. At a rounded side the tangent plane runs along the ray: it is carried on at most at `steepest`.
+[[gnu::always_inline]] inline Lanes depth_behind(const DepthMap& map, const OutlineBlock& b, float distance,
+                                                 float steepest, LaneInts& measured) {
+  const LaneInts pixel = pixels_of(map, b.moved(distance));
+  Lanes depth = {};
+  for (int i = 0; i < kLanes; ++i) depth[i] = map.pixels[std::max(0, pixel[i])].position.z();
+  measured = (pixel >= 0) & (depth > 0) & (b.point.z > 0);
+  const Lanes zero = {}, one = zero + 1;
+  const Lanes towards = -b.normal.z > 0.05F ? -b.normal.z : zero + 0.05F;
+  Lanes slope = dot(b.normal, b.outward) / towards;
+  slope = slope > steepest ? zero + steepest : slope;
+  slope = slope < -steepest ? zero - steepest : slope;
+  return (depth - b.point.z - slope * distance) / root(one + slope * slope);
+}
 
 /// Whether the scene's surface ends where the model's does.
 BINPOSE_VECTORISED
@@ -74,12 +52,10 @@ void check_outline(const DepthMap& map, const std::vector<ContourPoint>& outline
   const auto stride = static_cast<std::size_t>(options.outline_stride);
   OutlineBlock block;
   for (std::size_t first = 0; first < outline.size(); first += kLanes * stride) {
-    const std::size_t left = (outline.size() - first + stride - 1) / stride;
-    block.load(&outline[first], static_cast<int>(std::min<std::size_t>(kLanes, left)), options.outline_stride,
-               T_view_model);
+    block.load(outline, first, options.outline_stride, T_view_model);
     LaneInts known_inside, known_outside;
-    const Lanes inside = block.depth_behind(map, -kInside * map.pixel_size, 5, known_inside);
-    const Lanes outside = block.depth_behind(map, kOutside * map.pixel_size, 1, known_outside);
+    const Lanes inside = depth_behind(map, block, -kInside * map.pixel_size, 5, known_inside);
+    const Lanes outside = depth_behind(map, block, kOutside * map.pixel_size, 1, known_outside);
     const LaneInts missing = known_inside & (inside > options.tolerance);
     const LaneInts hidden = known_inside & (inside < -options.tolerance);
     const LaneInts judged = ~hidden & ~missing;
