@@ -34,15 +34,15 @@ DepthMap map_of(const SensorView& view, double diameter, const RunControl& contr
 void estimate_steady_normals(DepthMap& map, const RunControl& control) {
   constexpr int kWidest = 3;
   constexpr double kNormalError = 4 * kDegree;
-  std::vector<float> deviations = estimate_normals(map, 1, control);
+  WindowPlanes planes = estimate_normals(map, 1, control);
   const float noise = map.noise;
   int radius = 1;
   while (radius < kWidest && normal_error(noise, map.pixel_size, radius) > kNormalError) ++radius;
   if (radius > 1) {
-    deviations = estimate_normals(map, radius, control);
+    planes = estimate_normals(map, radius, control);
     map.noise = noise;
   }
-  sharpen_normals(map, deviations, radius, control);
+  sharpen_normals(map, planes, control);
 }
 
 }  // namespace

@@ -25,6 +25,11 @@ using LaneInts = std::int32_t __attribute__((vector_size(4 * kLanes)));  ///< ma
   return *reinterpret_cast<const Unaligned*>(values);
 }
 
+[[gnu::always_inline]] inline void store_lanes(const Lanes& lanes, float* values) {
+  using Unaligned [[gnu::aligned(4), gnu::may_alias]] = Lanes;
+  *reinterpret_cast<Unaligned*>(values) = lanes;
+}
+
 [[gnu::always_inline]] inline Lanes magnitude(const Lanes& a) { return a < 0 ? -a : a; }
 
 [[gnu::always_inline]] inline Lanes root(const Lanes& a) {

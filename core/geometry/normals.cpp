@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/geometry/lanes.h"
+#include "core/geometry/lane_points.h"
 #include "core/parallel.h"
 
 namespace binpose {
@@ -84,16 +84,10 @@ struct PlaneFit {
   }
 };
 
-/// How far the points of each pixel's window lie off its plane, along the normal, metres; infinite where unknown.
-struct Deviations {
-  std::vector<float> all, steady;  ///< those of whole windows that face the sensor apart: they tell of its noise
-
-  explicit Deviations(std::size_t count) : all(count, INFINITY), steady(count, INFINITY) {}
-};
-
 /// Normals of a row of pixels.
 BINPOSE_VECTORISED
-void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, Deviations& deviations) {
+void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, WindowPlanes& planes,
+             std::vector<float>& steady_deviations) {
   const auto whole = static_cast<float>((2 * radius + 1) * (2 * radius + 1));
   const float steepest = kSteepest * static_cast<float>(radius) / map.focal;
   for (int u = 0; u < map.width; u += kLanes) {
@@ -117,47 +111,36 @@ void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, Deviations&
     const LaneInts good = fit.known & (cosine >= kGrazingCosine);
     const LaneInts steady = good & (sums.n == whole) & (cosine > kSteadyCosine);
     const Lanes off = fit.deviation * z0 * cosine;
+    const Lanes zero = {}, scale = good ? -1 / length : zero;
+    const std::size_t to = planes.at(u, v);
+    store_lanes(a * scale, &planes.normal_x[to]);
+    store_lanes(b * scale, &planes.normal_y[to]);
+    store_lanes(c * scale, &planes.normal_z[to]);
+    store_lanes((a * x0 + b * y0 + c) * z0 * scale, &planes.offset[to]);
+    store_lanes(good & (z0 > 0) ? off : zero + INFINITY, &planes.deviation[to]);
     for (int lane = 0; lane < std::min(kLanes, map.width - u); ++lane) {
       const int i = v * map.width + u + lane;
       if (!map.measured(i)) continue;
-      const Eigen::Vector3f normal = -Eigen::Vector3f(a[lane], b[lane], c[lane]) / length[lane];
-      map.pixels[i].normal = good[lane] != 0 ? normal : Eigen::Vector3f(0, 0, 0);
-      if (good[lane] != 0) deviations.all[i] = off[lane];
-      if (steady[lane] != 0) deviations.steady[i] = off[lane];
+      map.pixels[i].normal = planes.normal(to + lane);
+      if (steady[lane] != 0) steady_deviations[i] = off[lane];
     }
   }
 }
 
 /// The noise that explains the quietest windows: edges and curvature only make others louder.
-float noise_of(std::vector<float> deviations) {
-  std::erase_if(deviations, [](float d) { return std::isinf(d); });
-  if (deviations.empty()) return 0;
-  const auto quarter = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 4);
-  std::nth_element(deviations.begin(), quarter, deviations.end());
+float noise_of(const std::vector<float>& deviations) {
+  constexpr std::size_t kEnoughWindows = 40'000;
+  std::vector<float> known;
+  const std::size_t step = 1 + deviations.size() / kEnoughWindows;
+  for (std::size_t i = 0; i < deviations.size(); i += step) {
+    if (!std::isinf(deviations[i])) known.push_back(deviations[i]);
+  }
+  if (known.empty()) return 0;
+  const auto quarter = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 4);
+  std::nth_element(known.begin(), quarter, known.end());
   // A quarter of the windows of 9 points on a plane deviate by less than this share of the noise: sqrt(chi^2_6 / 6).
   constexpr float kQuarterOfNine = 0.76F;
   return *quarter / kQuarterOfNine;
-}
-
-/// The window around a pixel, its own or one beside it, that describes it best.
-int quietest_window(const DepthMap& map, const std::vector<float>& deviations, int u, int v, int radius) {
-  const int own = v * map.width + u;
-  const float flat = kFlat * map.pixel_size;
-  if (deviations[own] < flat) return own;
-  float least = kMuchQuieter * deviations[own];
-  int quietest = own;
-  for (int row = v - radius; row <= v + radius; row += radius) {
-    for (int column = u - radius; column <= u + radius; column += radius) {
-      if (row < 0 || row >= map.height || column < 0 || column >= map.width) continue;
-      const int i = row * map.width + column;
-      if (!(deviations[i] < least)) continue;
-      const float off = map.pixels[i].normal.dot(map.pixels[own].position - map.pixels[i].position);
-      if (std::abs(off) > kOnPlane * deviations[i] + flat) continue;
-      least = deviations[i];
-      quietest = i;
-    }
-  }
-  return quietest;
 }
 
 struct SharpNormal {
@@ -166,13 +149,36 @@ struct SharpNormal {
 };
 
 /// The normals of a row that another window than their own gives.
-std::vector<SharpNormal> sharpen_row(const DepthMap& map, const std::vector<float>& deviations, int v, int radius) {
+BINPOSE_VECTORISED
+std::vector<SharpNormal> sharpen_row(const DepthMap& map, const WindowPlanes& planes, int v) {
+  const float flat = kFlat * map.pixel_size;
   std::vector<SharpNormal> sharper;
-  for (int u = 0; u < map.width; ++u) {
-    const int i = v * map.width + u;
-    if (!map.measured(i)) continue;
-    const int window = quietest_window(map, deviations, u, v, radius);
-    if (window != i) sharper.push_back({i, map.pixels[window].normal});
+  for (int u = 0; u < map.width; u += kLanes) {
+    const SurfacePoint* pixels = &map.pixels[static_cast<std::size_t>(v) * map.width + u];
+    const int count = std::min(kLanes, map.width - u);
+    const LanePoints p =
+        SurfaceLanes([&](int i) -> const SurfacePoint& { return pixels[std::min(i, count - 1)]; }).position;
+    Lanes least = load_lanes(&planes.deviation[planes.at(u, v)]);
+    const LaneInts open = (p.z > 0) & (least >= flat);
+    least *= kMuchQuieter;
+    LanePoints normal = {};
+    LaneInts found = {};
+    for (int row = v - planes.radius; row <= v + planes.radius; row += planes.radius) {
+      for (int column = u - planes.radius; column <= u + planes.radius; column += planes.radius) {
+        const std::size_t at = planes.at(column, row);
+        const Lanes deviation = load_lanes(&planes.deviation[at]);
+        const LanePoints n = {load_lanes(&planes.normal_x[at]), load_lanes(&planes.normal_y[at]),
+                              load_lanes(&planes.normal_z[at])};
+        const Lanes off = magnitude(dot(n, p) - load_lanes(&planes.offset[at]));
+        const LaneInts better = open & (deviation < least) & (off <= kOnPlane * deviation + flat);
+        least = better ? deviation : least;
+        normal = {better ? n.x : normal.x, better ? n.y : normal.y, better ? n.z : normal.z};
+        found |= better;
+      }
+    }
+    for_each_set(found, count, [&](int i) {
+      sharper.push_back({v * map.width + u + i, {normal.x[i], normal.y[i], normal.z[i]}});
+    });
   }
   return sharper;
 }
@@ -185,20 +191,27 @@ double normal_error(double noise, double pixel_size, int radius) {
   return noise / (pixel_size * std::sqrt(sum_sq_offset));
 }
 
-std::vector<float> estimate_normals(DepthMap& map, int radius, const RunControl& control) {
-  Deviations deviations(map.pixels.size());
-  const RayImage rays(map, radius, control.threads);
-  parallel_for(map.height, control.threads, [&](int v) {
-    if (!control.interrupted()) fit_row(map, rays, v, radius, deviations);
-  });
-  if (!control.interrupted()) map.noise = noise_of(std::move(deviations.steady));
-  return std::move(deviations.all);
+WindowPlanes::WindowPlanes(const DepthMap& map, int radius) : radius(radius), stride(map.width + 2 * radius + kLanes) {
+  const std::size_t count = static_cast<std::size_t>(stride) * (map.height + 2 * radius);
+  for (std::vector<float>* values : {&normal_x, &normal_y, &normal_z, &offset}) values->assign(count, 0);
+  deviation.assign(count, INFINITY);
 }
 
-void sharpen_normals(DepthMap& map, const std::vector<float>& deviations, int radius, const RunControl& control) {
+WindowPlanes estimate_normals(DepthMap& map, int radius, const RunControl& control) {
+  WindowPlanes planes(map, radius);
+  std::vector<float> steady_deviations(map.pixels.size(), INFINITY);
+  const RayImage rays(map, radius, control.threads);
+  parallel_for(map.height, control.threads, [&](int v) {
+    if (!control.interrupted()) fit_row(map, rays, v, radius, planes, steady_deviations);
+  });
+  if (!control.interrupted()) map.noise = noise_of(steady_deviations);
+  return planes;
+}
+
+void sharpen_normals(DepthMap& map, const WindowPlanes& planes, const RunControl& control) {
   std::vector<std::vector<SharpNormal>> rows(map.height);
   parallel_for(map.height, control.threads, [&](int v) {
-    if (!control.interrupted()) rows[v] = sharpen_row(map, deviations, v, radius);
+    if (!control.interrupted()) rows[v] = sharpen_row(map, planes, v);
   });
   if (control.interrupted()) return;
   for (const std::vector<SharpNormal>& row : rows) {

@@ -161,9 +161,9 @@ TEST(Normals, OnceSharpenedBelongToOneSideOfAnEdge) {
   for (const double noise : {0.0, 5e-5}) {
     for (const int radius : {1, 2}) {
       DepthMap map = map_of({&roof, 1}, std::nullopt, noise);
-      const std::vector<float> deviations = estimate_normals(map, radius);
+      const WindowPlanes planes = estimate_normals(map, radius);
       const int before = count_off_both_sides(map, roof);
-      sharpen_normals(map, deviations, radius);
+      sharpen_normals(map, planes);
       EXPECT_GT(before, 80) << "radius " << radius;
       EXPECT_LT(count_off_both_sides(map, roof), before / 5) << "radius " << radius << ", noise " << noise;
     }
@@ -173,8 +173,7 @@ TEST(Normals, OnceSharpenedBelongToOneSideOfAnEdge) {
 TEST(Normals, OnceSharpenedStayOnACurvedSurface) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
   DepthMap map = map_of({&ball, 1}, std::nullopt);
-  const std::vector<float> deviations = estimate_normals(map, 1);
-  sharpen_normals(map, deviations, 1);
+  sharpen_normals(map, estimate_normals(map, 1));
   const Vector3f centre = (map.T_scene_view.inverse() * Eigen::Vector3d(0, 0, 0.5)).cast<float>();
   for (const SurfacePoint& pixel : map.pixels) {
     const Vector3f radial = (pixel.position - centre).normalized();
@@ -203,10 +202,10 @@ TEST(Normals, ErrFromAWindowAsLeastSquaresOverItsOffsets) {
 TEST(Normals, AreTheSameOnAnyNumberOfThreads) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
   DepthMap one = map_of({&ball, 1}, 0.55, 1e-4);
-  sharpen_normals(one, estimate_normals(one, 1), 1);
+  sharpen_normals(one, estimate_normals(one, 1));
   for (const int threads : {2, 4}) {
     DepthMap many = one;
-    sharpen_normals(many, estimate_normals(many, 1, {.threads = threads}), 1, {.threads = threads});
+    sharpen_normals(many, estimate_normals(many, 1, {.threads = threads}), {.threads = threads});
     for (std::size_t i = 0; i < one.pixels.size(); ++i) ASSERT_EQ(many.pixels[i].normal, one.pixels[i].normal) << i;
   }
 }
