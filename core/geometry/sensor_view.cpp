@@ -71,32 +71,37 @@ class PointsInView {
   Eigen::Vector3f sensor_;
 };
 
-/// Sets the points, their normals and window. The blocks are counted first, so that each can be written to its place.
+/// Sets the points, their normals and window: each block where it lies in the cloud, then all moved together.
 void take_points(const PointCloud& cloud, const RunControl& control, SensorView& view) {
   const PointsInView source(cloud, view.T_scene_view);
-  std::vector<std::size_t> first(source.block_count() + 1, 0);
+  std::vector<std::size_t> counts(source.block_count(), 0);
   std::vector<TangentBox> windows(source.block_count());
+  view.points.resize(cloud.points.size());
+  view.normals.resize(cloud.normals.size());
   parallel_for(source.block_count(), control.threads, [&](int b) {
     if (control.stop.stop_requested()) return;
-    source.for_each(b, [&](std::size_t, const Eigen::Vector3f& p) {
-      windows[b].extend(p);
-      ++first[b + 1];
-    });
-  });
-  for (int b = 0; b < source.block_count(); ++b) {
-    first[b + 1] += first[b];
-    view.window.extend(windows[b]);
-  }
-  view.points.resize(first.back());
-  if (!cloud.normals.empty()) view.normals.resize(first.back());
-  parallel_for(source.block_count(), control.threads, [&](int b) {
-    if (control.stop.stop_requested()) return;
-    std::size_t to = first[b];
+    const std::size_t first = b * kPointsPerBlock;
     source.for_each(b, [&](std::size_t i, const Eigen::Vector3f& p) {
+      const std::size_t to = first + counts[b]++;
+      view.points[to] = p;
       if (!cloud.normals.empty()) view.normals[to] = source.normal(i);
-      view.points[to++] = p;
+      windows[b].extend(p);
     });
   });
+  std::size_t total = 0;
+  for (int b = 0; b < source.block_count(); ++b) {
+    const auto move_up = [&](std::vector<Eigen::Vector3f>& values) {
+      const auto first = values.begin() + static_cast<std::ptrdiff_t>(b * kPointsPerBlock);
+      const auto to = values.begin() + static_cast<std::ptrdiff_t>(total);
+      if (first != to) std::copy_n(first, counts[b], to);
+    };
+    move_up(view.points);
+    if (!cloud.normals.empty()) move_up(view.normals);
+    view.window.extend(windows[b]);
+    total += counts[b];
+  }
+  view.points.resize(total);
+  if (!cloud.normals.empty()) view.normals.resize(total);
 }
 
 /// Of every n-th point.
