@@ -44,36 +44,30 @@ Eigen::Vector3d viewing_direction(const std::vector<Eigen::Vector3f>& points, co
 }
 
 /// The measured points of a cloud in the view frame.
-class PointsInView {
- public:
-  PointsInView(const PointCloud& cloud, const Pose& T_scene_view)
-      : cloud_(cloud),
-        R_view_scene_(T_scene_view.linear().transpose().cast<float>()),
-        sensor_(T_scene_view.translation().cast<float>()) {}
+struct PointsInView {
+  const PointCloud& cloud;
+  Eigen::Matrix3f R_view_scene;
+  Eigen::Vector3f sensor;  // scene frame
 
   /// Calls `use(i, point)` for each of a block of the cloud's points that lies in front of the sensor.
   template <typename Use>
   void for_each(std::size_t block, const Use& use) const {
-    const std::size_t end = std::min(cloud_.points.size(), (block + 1) * kPointsPerBlock);
+    const std::size_t end = std::min(cloud.points.size(), (block + 1) * kPointsPerBlock);
     for (std::size_t i = block * kPointsPerBlock; i < end; ++i) {
-      const Eigen::Vector3f p = R_view_scene_ * (cloud_.points[i] - sensor_);
+      const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
       const bool seen =
           p.allFinite() && p.z() > 1e-6F && std::max(std::abs(p.x()), std::abs(p.y())) <= kWidestTangent * p.z();
       if (seen) use(i, p);
     }
   }
-  Eigen::Vector3f normal(std::size_t i) const { return R_view_scene_ * cloud_.normals[i]; }
-  int block_count() const { return static_cast<int>((cloud_.points.size() + kPointsPerBlock - 1) / kPointsPerBlock); }
-
- private:
-  const PointCloud& cloud_;
-  Eigen::Matrix3f R_view_scene_;
-  Eigen::Vector3f sensor_;
+  Eigen::Vector3f normal(std::size_t i) const { return R_view_scene * cloud.normals[i]; }
+  int block_count() const { return static_cast<int>((cloud.points.size() + kPointsPerBlock - 1) / kPointsPerBlock); }
 };
 
 /// Sets the points, their normals and window: each block where it lies in the cloud, then all moved together.
 void take_points(const PointCloud& cloud, const RunControl& control, SensorView& view) {
-  const PointsInView source(cloud, view.T_scene_view);
+  const PointsInView source = {cloud, view.T_scene_view.linear().transpose().cast<float>(),
+                               view.T_scene_view.translation().cast<float>()};
   std::vector<std::size_t> counts(source.block_count(), 0);
   std::vector<TangentBox> windows(source.block_count());
   view.points.resize(cloud.points.size());

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/detect/ownership.h"
+#include "tests/scenes/random.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
 
@@ -163,6 +165,62 @@ TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
   const Ranking ranking = rank(scene.map, models, {doubtful, sure}, {options, 0.1, between, 0});
   ASSERT_EQ(ranking.accepted.size(), 1U);
   EXPECT_EQ(ranking.accepted[0].model_index, 0);
+}
+
+TEST(Rank, IsTheSameOnAnyNumberOfThreads) {
+  const RankedScene scene = blocks();
+  std::vector<Candidate> candidates;
+  scenes::Random random(5);
+  for (int i = 0; i < 60; ++i) {
+    const Vector3d shift = random.rotation() * Vector3d(i % 3 == 0 ? 0.002 : 0.02, 0, 0);
+    candidates.push_back(scene.candidate(Eigen::Translation3d(shift) * scene.poses[i % 2]));
+  }
+  const Model* models[] = {&scene.model};
+  const RankOptions options = {scene.options, 0.1, 0, 20};
+  const Ranking one = rank(scene.map, models, candidates, options);
+  ASSERT_GE(one.accepted.size(), 2U);
+  ASSERT_GE(one.rejected.size(), 1U);
+  for (const int threads : {2, 8}) {
+    const Ranking many = rank(scene.map, models, candidates, options, {.threads = threads});
+    const auto expect_same = [](const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
+      ASSERT_EQ(a.size(), b.size());
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i].T_view_model.matrix(), b[i].T_view_model.matrix());
+        EXPECT_EQ(a[i].score(), b[i].score());
+        EXPECT_EQ(a[i].occluded_by, b[i].occluded_by);
+      }
+    };
+    expect_same(many.accepted, one.accepted);
+    expect_same(many.rejected, one.rejected);
+  }
+}
+
+TEST(Ownership, IsOfPixelsInTheImageBoxOnly) {
+  const RankedScene scene = blocks();
+  Eigen::AlignedBox3f surface;
+  for (const SurfacePoint& point : scene.model.surface) surface.extend(point.position);
+  for (const Pose& pose : scene.poses) {
+    const Candidate candidate = scene.candidate(pose);
+    std::vector<int> owner(scene.map.pixels.size(), kNobody);
+    own_pixels(scene.map, scene.model, candidate, scene.options[0].tolerance, 3, owner);
+    const Eigen::AlignedBox2i box = image_box(scene.map, surface, candidate.T_view_model);
+    EXPECT_LT(box.volume(), scene.map.width * scene.map.height / 3);
+    int owned = 0;
+    for (int i = 0; i < static_cast<int>(owner.size()); ++i) {
+      if (owner[i] == kNobody) continue;
+      ++owned;
+      EXPECT_TRUE(box.contains(Eigen::Vector2i(i % scene.map.width, i / scene.map.width)));
+    }
+    EXPECT_GT(owned, 200);
+  }
+}
+
+TEST(Ownership, ImageBoxOfAPartAroundTheSensorIsTheWholeImage) {
+  const RankedScene scene = blocks();
+  const Eigen::AlignedBox3f around(Eigen::Vector3f::Constant(-1), Eigen::Vector3f::Constant(1));
+  const Eigen::AlignedBox2i box = image_box(scene.map, around, Eigen::Isometry3f::Identity());
+  EXPECT_TRUE(box.contains(Eigen::Vector2i(0, 0)));
+  EXPECT_TRUE(box.contains(Eigen::Vector2i(scene.map.width - 1, scene.map.height - 1)));
 }
 
 TEST(Rank, OfEqualScoresKeepsTheOrderOfTheList) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/detect/verify.h"
 #include "tests/scenes/random.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
@@ -78,6 +79,43 @@ TEST(Refine, LeavesAPoseAloneWhereNothingIs) {
   for (const Vector3d& at : {Vector3d(5, 0, 0.5), Vector3d(0, 0, -0.5), Vector3d(0, 0, 0.2)}) {
     const Pose nowhere = testing::pose(10, Vector3d::UnitX(), at);
     EXPECT_TRUE(scan.refined(nowhere).isApprox(nowhere, 1e-5)) << at.transpose();
+  }
+}
+
+/// The slow twin of what draws a pose to contours: one outline point after the other; translations before rotations.
+Matrix6d outline_information(const testing::PartScan& scan, const Eigen::Isometry3f& T, float gate) {
+  const DepthMap& map = scan.map;
+  const Eigen::Vector3f pivot = T * scan.model.centre.cast<float>();
+  const int reach = std::max(1, static_cast<int>(gate / map.pixel_size));
+  Matrix6d information = Matrix6d::Zero();
+  for (const ContourPoint& outline : scan.model.outlines[nearest_viewpoint(scan.model, T)]) {
+    const Eigen::Vector3f p = T * outline.position, normal = T.linear() * outline.normal;
+    const Eigen::Vector3f outward = T.linear() * outline.outward;
+    for (int k = 0; k <= 2 * reach; ++k) {
+      const int step = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
+      const int pixel = map.pixel_of(p + static_cast<float>(step) * map.pixel_size * outward);
+      if (pixel < 0 || map.contour_at[pixel] < 0) continue;
+      const ContourPoint& contour = map.contours[map.contour_at[pixel]];
+      const Eigen::Vector3f offset = contour.position - p;
+      if (contour.outward.dot(outward) <= 0.7F || std::abs(normal.dot(offset)) >= gate) continue;
+      const double relative = outward.dot(offset) / gate;
+      Twist row;
+      row << outward.cast<double>(), (p - pivot).cross(outward).cast<double>();
+      if (std::abs(relative) < 1) information += std::pow(1 - relative * relative, 2) * row * row.transpose();
+      break;
+    }
+  }
+  return information;
+}
+
+TEST(Refine, LooksForContoursOfEightOutlinePointsAtATimeAsALoopDoesOneByOne) {
+  const RefinedScan scan(testing::l_block(), testing::pose(40, {1, 0.5, 0.2}, {0, 0, 0.43}));
+  for (const double off : {0.0, 0.01, 0.03}) {
+    const Eigen::Isometry3f T = testing::in_view(scan.map, scan.disturbed(2, Vector3d::UnitX(), {off, off, 0}));
+    const float gate = static_cast<float>(0.05 * scan.model.diameter);
+    const Matrix6d expected = outline_information(scan, T, gate);
+    ASSERT_GT(expected.norm(), 5) << off;
+    EXPECT_LT((information_of(scan.map, scan.model, T, gate).outline - expected).norm(), 1e-3 * expected.norm()) << off;
   }
 }
 

@@ -1,6 +1,5 @@
 #include "core/geometry/depth_map.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +14,6 @@ namespace binpose {
 namespace {
 
 using Eigen::Vector3f;
-using ::testing::HasSubstr;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
@@ -28,67 +26,6 @@ PointCloud block_over_floor() {
   sensor.height = 120;
   sensor.focal = 300;
   return testing::render(bodies, sensor);
-}
-
-TEST(SensorView, MapsBackOntoTheCloud) {
-  PointCloud cloud = block_over_floor();
-  cloud.sensor_position = Eigen::Vector3d(0.05, -0.02, 0.01);
-  const absl::StatusOr<SensorView> view = sensor_view(cloud);
-  ASSERT_TRUE(view.ok());
-  ASSERT_EQ(view->points.size(), cloud.points.size());
-  EXPECT_TRUE((view->T_scene_view * Eigen::Vector3d::Zero()).isApprox(cloud.sensor_position));
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    const Eigen::Vector3d back = view->T_scene_view * view->points[i].cast<double>();
-    ASSERT_LT((back - cloud.points[i].cast<double>()).norm(), 1e-6);
-  }
-}
-
-TEST(SensorView, MeasuresTheSpacingOfAGrid) {
-  testing::PinholeSensor sensor;
-  sensor.focal = 300;
-  const absl::StatusOr<SensorView> view = sensor_view(testing::render({}, sensor));
-  ASSERT_TRUE(view.ok());
-  EXPECT_NEAR(view->median_depth, 0.5, 1e-4);
-  EXPECT_NEAR(view->spacing, 0.5 / 300, 0.1 * 0.5 / 300);
-}
-
-TEST(SensorView, LeavesOutWhatWasNotMeasuredOrLiesBehindTheSensor) {
-  const absl::StatusOr<SensorView> view = sensor_view(testing::scattered(
-      {{0, 0, 0.5F}, {kNan, 0, 0.5F}, {0, 0, INFINITY}, {0, 0, -0.5F}, {0.01F, 0, 0.5F}, {0, 0.01F, 0.6F}}));
-  ASSERT_TRUE(view.ok());
-  EXPECT_EQ(view->points.size(), 3u);
-}
-
-struct Refused {
-  const char* what;
-  PointCloud cloud;
-  const char* says;
-};
-
-TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
-  PointCloud wrong_size = testing::scattered({{0, 0, 1}, {0, 0, 2}});
-  wrong_size.height = 2;
-  PointCloud huge_size = testing::scattered({{0, 0, 1}});
-  huge_size.width = huge_size.height = 0xFFFFFFFF;
-  PointCloud lost_sensor = testing::scattered({{0, 0, 1}});
-  lost_sensor.sensor_position.x() = kNan;
-  PointCloud few_normals = testing::scattered({{0, 0, 1}, {0, 0, 2}});
-  few_normals.normals = {{0, 0, -1}};
-  const Refused cases[] = {
-      {"size", wrong_size, "2 points; width x height is 2 x 2 = 4"},
-      {"huge size", huge_size, "1 points; width x height is"},
-      {"empty", testing::scattered({}), "0 points"},
-      {"no measurement", testing::scattered({{kNan, kNan, kNan}, {INFINITY, 0, 1}}),
-       "no measurement among its 2 points"},
-      {"all in the sensor", testing::scattered({{0, 0, 0}, {0, 0, 0}}), "no measurement among its 2 points"},
-      {"sensor position", lost_sensor, "sensor_position"},
-      {"normals", few_normals, "1 normals for 2 points"},
-  };
-  for (const Refused& refused : cases) {
-    const absl::StatusOr<SensorView> view = sensor_view(refused.cloud);
-    ASSERT_EQ(view.status().code(), absl::StatusCode::kInvalidArgument) << refused.what;
-    EXPECT_THAT(std::string(view.status().message()), HasSubstr(refused.says)) << refused.what;
-  }
 }
 
 TEST(DepthMap, HoldsTheNearestPointOfEachPixel) {
@@ -134,6 +71,20 @@ TEST(DepthMap, FillsASinglePixelBetweenNeighboursOfOneSurface) {
 }
 
 TEST(DepthMap, LeavesAPixelEmptyAtADepthStep) { EXPECT_EQ(measured_count(wall_with_a_hole(1, 0.1F)), 440); }
+
+TEST(DepthMap, IsTheSameOnAnyNumberOfThreads) {
+  PointCloud cloud = block_over_floor();
+  cloud.normals.assign(cloud.points.size(), Vector3f(0, 0.6F, -0.8F));
+  const SensorView view = *sensor_view(cloud);
+  const DepthMap one = depth_map(view, 0.004);
+  for (const int threads : {2, 3, 7}) {
+    const DepthMap many = depth_map(view, 0.004, {.threads = threads});
+    for (std::size_t i = 0; i < one.pixels.size(); ++i) {
+      ASSERT_EQ(many.pixels[i].position, one.pixels[i].position) << i;
+      ASSERT_EQ(many.pixels[i].normal, one.pixels[i].normal) << i;
+    }
+  }
+}
 
 TEST(DepthMap, HasPixelsOfTheWantedSize) {
   const SensorView view = *sensor_view(block_over_floor());

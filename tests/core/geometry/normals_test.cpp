@@ -170,6 +170,45 @@ TEST(Normals, OnceSharpenedBelongToOneSideOfAnEdge) {
   }
 }
 
+/// The slow twin of sharpen_normals(): the normal of the window that describes a pixel best, one after the other.
+Vector3f sharpened(const DepthMap& map, const WindowPlanes& planes, int u, int v) {
+  const std::size_t own = planes.at(u, v);
+  const SurfacePoint& pixel = map.pixels[static_cast<std::size_t>(v) * map.width + u];
+  const float flat = 0.02F * map.pixel_size;
+  Vector3f normal = pixel.normal;
+  float least = 0.7F * planes.deviation[own];
+  if (planes.deviation[own] < flat || !(pixel.position.z() > 0)) return normal;
+  for (int row = -1; row <= 1; ++row) {
+    for (int column = -1; column <= 1; ++column) {
+      const std::size_t i = planes.at(u + column * planes.radius, v + row * planes.radius);
+      const float off = std::abs(planes.normal(i).dot(pixel.position) - planes.offset[i]);
+      if (!(planes.deviation[i] < least) || off > 2 * planes.deviation[i] + flat) continue;
+      least = planes.deviation[i];
+      normal = planes.normal(i);
+    }
+  }
+  return normal;
+}
+
+TEST(Normals, AreSharpenedEightAtATimeAsALoopDoesOneByOne) {
+  const testing::PlacedMesh block = placed(testing::box({0.08F, 0.08F, 0.05F}), {0, 0, 0.45}, 20);
+  for (const int radius : {1, 2}) {
+    DepthMap map = map_of({&block, 1}, 0.5, 1e-4);
+    const WindowPlanes planes = estimate_normals(map, radius);
+    const DepthMap before = map;
+    sharpen_normals(map, planes);
+    int changed = 0;
+    for (int v = 0; v < map.height; ++v) {
+      for (int u = 0; u < map.width; ++u) {
+        const int i = v * map.width + u;
+        ASSERT_LT((map.pixels[i].normal - sharpened(before, planes, u, v)).norm(), 1e-5F) << u << ", " << v;
+        changed += map.pixels[i].normal != before.pixels[i].normal ? 1 : 0;
+      }
+    }
+    EXPECT_GT(changed, 500);
+  }
+}
+
 TEST(Normals, OnceSharpenedStayOnACurvedSurface) {
   const testing::PlacedMesh ball = placed(testing::sphere(0.06F), {0, 0, 0.5});
   DepthMap map = map_of({&ball, 1}, std::nullopt);
