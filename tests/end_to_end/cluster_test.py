@@ -19,7 +19,8 @@ import grpc
 from cluster_load import Command, PlainCaller, Streamer, cloud, train_request  # before wire
 import wire
 from binpose_process import BIN
-from cluster_hosts import HAS_NAMESPACES, NAMES, BalancerHost, ServerHost, make_certificates, make_network, wait_for
+from cluster_hosts import (HAS_NAMESPACES, NAMES, PATIENCE, BalancerHost, ServerHost, make_certificates, make_network,
+                           wait_for)
 
 FULL = os.environ.get("BINPOSE_CLUSTER") == "full"
 IDS = [f"part-{i}" for i in range(10)]
@@ -35,7 +36,7 @@ def train(api, model_id):
     call = api._method("unary_stream", "ModelService/Train", wire.model.TrainRequest, wire.model.TrainResponse)
     while True:
         try:
-            return list(call(train_request(model_id), timeout=600))[-1].model
+            return list(call(train_request(model_id), timeout=600 * PATIENCE))[-1].model
         except grpc.RpcError as error:
             if error.code() != grpc.StatusCode.RESOURCE_EXHAUSTED:
                 raise
