@@ -102,7 +102,7 @@ class ServerHost(Host):
 
     def __init__(self, name, number, shared, *arguments):
         super().__init__(name, number)
-        self.shared, self.arguments = shared, arguments
+        self.shared, self.arguments, self.target = shared, arguments, f"{self.address}:50051"
         self.models = shared.parent / f"models-{name}"
         self.models.symlink_to(shared)
 
