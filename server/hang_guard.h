@@ -2,19 +2,18 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <filesystem>
 #include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_format.h"
 #include "server/clock.h"
 #include "server/status.h"
 
@@ -24,15 +23,24 @@ namespace binpose::server {
 inline constexpr std::chrono::seconds kDirectoryPatience(5);
 
 /// Keeps callers from hanging with a directory: a call into a share that is away may return only when it is back, and
-/// who detects from memory needs the caller's thread. Its destructor waits for the calls that still hang.
+/// who detects from memory needs the caller's thread. Logs once that the directory is away, and once that it is back.
+/// Its destructor waits for the calls that still hang.
 class HangGuard {
  public:
-  /// @param answers  whether the directory is there; it may hang, and is asked twice a second.
-  HangGuard(std::filesystem::path directory, std::function<bool()> answers)
-      : directory_(std::move(directory)),
-        asker_([this, answers = std::move(answers)](const std::stop_token& stop) { ask(answers, stop); }) {}
+  struct Times {
+    std::chrono::milliseconds patience = kDirectoryPatience;   ///< a directory that is silent for longer is away
+    std::chrono::milliseconds rest = std::chrono::minutes(1);  ///< at least, between two times that it is told away
+  };
 
-  void note_answer() { last_answer_ = Clock::now(); }
+  /// @param answers  whether the directory is there; it may hang, and is asked ten times in a patience.
+  HangGuard(std::filesystem::path directory, std::function<bool()> answers)
+      : HangGuard(std::move(directory), std::move(answers), Times()) {}
+  HangGuard(std::filesystem::path directory, std::function<bool()> answers, const Times& times);
+
+  /// The directory was read as it should be.
+  void note_answer();
+  /// It answered, but not as a model directory: it is away until note_answer().
+  void note_fault(const absl::Status& fault);
   /// Seconds since the directory last answered.
   double age() const { return seconds_since(last_answer_); }
 
@@ -55,36 +63,21 @@ class HangGuard {
   }
 
  private:
-  /// In a thread of its own, so that a slow disk that takes or gives a model is not taken for one that hangs.
-  void ask(const std::function<bool()>& answers, const std::stop_token& stop) {
-    constexpr std::chrono::milliseconds kInterval(500);
-    std::mutex mutex;
-    std::condition_variable_any wake;
-    std::unique_lock lock(mutex);
-    while (!wake.wait_for(lock, stop, kInterval, [&stop] { return stop.stop_requested(); })) {
-      if (answers()) note_answer();
-    }
-  }
-
-  absl::Status check_answers() const {
-    if (age() < std::chrono::duration<double>(kDirectoryPatience).count()) return absl::OkStatus();
-    return absl::UnavailableError(
-        absl::StrFormat("The model directory %s has not answered for %.0f s.", directory_.string(), age()));
-  }
-
-  void abandon(std::future<void> call) {
-    const std::lock_guard lock(mutex_);
-    std::erase_if(abandoned_, [](const auto& other) {
-      return other.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    });
-    abandoned_.push_back(std::move(call));
-  }
+  void ask(const std::function<bool()>& answers, const std::stop_token& stop);
+  void tell(const std::stop_token& stop);
+  bool is_silent() const { return age() > std::chrono::duration<double>(times_.patience).count(); }
+  absl::Status check_answers() const;
+  absl::Status fault() const;
+  void abandon(std::future<void> call);
 
   const std::filesystem::path directory_;
+  const Times times_;
   std::atomic<Clock::time_point> last_answer_ = Clock::now();
-  std::mutex mutex_;
+  mutable std::mutex mutex_;                  ///< guards what follows
+  absl::Status fault_;                        ///< that was noted last, if no answer was noted since
   std::vector<std::future<void>> abandoned_;  ///< still under way when they were last looked at
-  std::jthread asker_;                        ///< last, so that it ends before the rest goes
+  std::jthread asker_;                        ///< in threads of their own, since it may hang; last, so that they end
+  std::jthread teller_;                       ///< before the rest goes
 };
 
 }  // namespace binpose::server

@@ -4,9 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <future>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -52,6 +55,21 @@ absl::Status healthcheck(const binpose::server::Config& config) {
   return binpose::server::probe(config.metrics, "/readyz");
 }
 
+using binpose::server::Server;
+
+/// A server once it serves. Ends the process on one of `signals` before: a share may hang for hours.
+absl::StatusOr<std::unique_ptr<Server>> start(const binpose::server::Config& config, const sigset_t& signals) {
+  auto server = std::async(std::launch::async, [&config] { return Server::start(config); });
+  while (server.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    constexpr timespec kLookAfter = {.tv_sec = 0, .tv_nsec = 10'000'000};
+    if (const int signal = sigtimedwait(&signals, nullptr, &kLookAfter); signal > 0) {
+      spdlog::info("ending on signal {} before serving", signal);
+      std::_Exit(EXIT_SUCCESS);
+    }
+  }
+  return server.get();
+}
+
 int report(const absl::Status& status) {
   if (status.ok()) return EXIT_SUCCESS;
   std::cerr << status.message() << std::endl;
@@ -87,7 +105,7 @@ int main(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 
-  const auto server = binpose::server::Server::start(config);
+  const auto server = start(config, signals);
   if (!server.ok()) {
     spdlog::critical("{}", std::string(server.status().message()));
     return EXIT_FAILURE;

@@ -40,7 +40,7 @@ ModelStore::ModelStore(std::filesystem::path directory, const ModelLimits& limit
              [this](const std::filesystem::path& path, const std::string& id) {
                return guard_.run([path, id] { return load_file(path, id); });
              }),
-      guard_(directory_, [this] { return !is_away_ && has_sign(directory_); }) {}
+      guard_(directory_, [this] { return has_sign(directory_); }) {}
 
 /// What came of looking for the newest generation of a model that can be used.
 struct ModelStore::Look {
@@ -58,13 +58,14 @@ struct ModelStore::Look {
 
 absl::StatusOr<std::unique_ptr<ModelStore>> ModelStore::open(const std::filesystem::path& directory,
                                                              const ModelLimits& limits) {
+  // First, since its guard tells if one of the next steps hangs.
+  std::unique_ptr<ModelStore> store(new ModelStore(directory, limits));
   if (absl::Status status = make_model_directory(directory); !status.ok()) return status;
   // To serve nothing because nothing can be read would be worse than not to start.
   if (absl::Status status = list_model_directory(directory).status(); !status.ok()) {
     return absl::InternalError(status.message());
   }
   remove_leftovers(directory, kModelSuffix);
-  std::unique_ptr<ModelStore> store(new ModelStore(directory, limits));
   constexpr int kLooks = 3;  // at a directory where others prune
   for (int i = 0; i < kLooks && !store->follow_directory(limits.load_threads); ++i) {
   }
@@ -139,15 +140,7 @@ absl::StatusOr<Generations> ModelStore::follow_model(const std::string& id) {
 /// Notes whether the directory is there: a share that is away for a moment takes no model with it.
 absl::StatusOr<DirectoryContent> ModelStore::list_directory() {
   absl::StatusOr<DirectoryContent> content = list_model_directory(directory_);
-  if (content.ok()) guard_.note_answer();
-  if (is_away_ == content.ok()) {
-    is_away_ = !content.ok();
-    if (is_away_) {
-      spdlog::warn("{} Models are served from memory until it is back.", std::string(content.status().message()));
-    } else {
-      spdlog::info("the model directory {} is back", directory_.string());
-    }
-  }
+  content.ok() ? guard_.note_answer() : guard_.note_fault(content.status());
   return content;
 }
 

@@ -94,8 +94,7 @@ class ModelStore {
   const ModelLimits limits_;
   ModelCache cache_;  ///< what is served
   std::atomic<std::size_t> skipped_files_ = 0;
-  std::atomic<bool> is_away_ = false;  ///< the directory
-  std::mutex disk_mutex_;              ///< guards what follows, and is held while a file and its entry change
+  std::mutex disk_mutex_;  ///< guards what follows, and is held while a file and its entry change
   std::map<std::string, Generations, std::less<>> seen_;   ///< that were dealt with
   std::map<std::string, std::uint32_t, std::less<>> put_;  ///< generations that this server put last
   std::map<std::string, Place, std::less<>> places_;       ///< of the models that are served

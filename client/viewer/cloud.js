@@ -11,21 +11,19 @@ export function cloudPoints(stage, cloud, sensor, tolerance) {
   const kept = measured(xyz);
   const shade = cloud.columns > 1 ? shadeBySlope(cloud, sensor) : shadeByDepth(xyz, kept, sensor);
   const position = new Float32Array(3 * kept.length);
-  const colour = new Float32Array(3 * kept.length);
+  const brightness = new Uint8Array(kept.length);
   for (let to = 0; to < kept.length; ++to) {
-    const from = kept[to];
-    const brightness = shade(from);
-    for (let k = 0; k < 3; ++k) {
-      position[3 * to + k] = xyz[3 * from + k];
-      colour[3 * to + k] = TINT[k] * brightness;
-    }
+    const from = 3 * kept[to];
+    position[3 * to] = xyz[from];
+    position[3 * to + 1] = xyz[from + 1];
+    position[3 * to + 2] = xyz[from + 2];
+    brightness[to] = 255 * shade(kept[to]);
   }
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-  geometry.setAttribute("color", new THREE.BufferAttribute(colour, 3));
+  geometry.setAttribute("brightness", new THREE.BufferAttribute(brightness, 1, true));
   const { centre, radius, spacing } = extentOf(position);
-  const material = new THREE.PointsMaterial({ size: stage.pointSize(spacing), vertexColors: true });
-  setBack(material, tolerance);
+  const material = pointsMaterial(stage, spacing, tolerance);
   const points = new THREE.Points(geometry, material);
   Object.assign(points.userData, { centre, radius });
   return points;
@@ -41,25 +39,39 @@ function measured(xyz) {
   return kept.subarray(0, count);
 }
 
-/** Draws points that much farther away than they are, at the same place of the picture. */
-function setBack(material, millimetres) {
-  material.onBeforeCompile = (shader) => {
-    shader.vertexShader = shader.vertexShader.replace("#include <project_vertex>", `#include <project_vertex>
-      mvPosition.xyz += ${millimetres.toFixed(3)} * normalize(mvPosition.xyz);
-      gl_Position = projectionMatrix * mvPosition;`);
-  };
+/** Of points that measure `spacing`, drawn `tolerance` farther away than they are, at the same place of the picture. */
+function pointsMaterial(stage, spacing, tolerance) {
+  const vertexShader = `
+    attribute float brightness;
+    flat varying vec3 light;
+    uniform float pixels;
+    void main() {
+      vec3 at = (modelViewMatrix * vec4(position, 1.0)).xyz;
+      gl_PointSize = ${spacing.toFixed(6)} * pixels / -at.z;
+      gl_Position = projectionMatrix * vec4(at + ${tolerance.toFixed(3)} * normalize(at), 1.0);
+      light = brightness * vec3(${TINT});
+    }`;
+  const fragmentShader = `
+    flat varying vec3 light;
+    void main() {
+      gl_FragColor = vec4(light, 1.0);
+      #include <colorspace_fragment>
+    }`;
+  return new THREE.ShaderMaterial({ vertexShader, fragmentShader, uniforms: { pixels: stage.pixels } });
 }
 
-/** Of an organised cloud: bright where the surface faces the sensor. */
+/** Of an organised cloud: bright where the surface faces the sensor. Plain numbers: this runs for each point. */
 function shadeBySlope({ xyz, columns }, sensor) {
-  const [here, right, below, n] = Array.from({ length: 4 }, () => new THREE.Vector3());
   return (i) => {
-    here.fromArray(xyz, 3 * i);
-    right.fromArray(xyz, 3 * (i + 1)).sub(here);
-    below.fromArray(xyz, 3 * (i + columns)).sub(here);
-    n.crossVectors(right, below).normalize();
-    const facing = Math.abs(n.dot(here.sub(sensor).normalize()));
-    return Number.isFinite(facing) ? 0.12 + 0.75 * facing ** 1.5 : 0.3;
+    const here = 3 * i, right = here + 3, below = here + 3 * columns;
+    const [x, y, z] = [xyz[here], xyz[here + 1], xyz[here + 2]];
+    const [ax, ay, az] = [xyz[right] - x, xyz[right + 1] - y, xyz[right + 2] - z];
+    const [bx, by, bz] = [xyz[below] - x, xyz[below + 1] - y, xyz[below + 2] - z];
+    const [nx, ny, nz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
+    const [dx, dy, dz] = [x - sensor.x, y - sensor.y, z - sensor.z];
+    const lengths = Math.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz));
+    const facing = Math.abs(nx * dx + ny * dy + nz * dz) / lengths;
+    return Number.isFinite(facing) ? 0.12 + 0.75 * facing * Math.sqrt(facing) : 0.3;
   };
 }
 
@@ -80,9 +92,7 @@ function extentOf(position) {
   const step = Math.max(1, Math.floor(count / SAMPLES));
   const [low, high] = [new THREE.Vector3(), new THREE.Vector3()];
   for (let axis = 0; axis < 3; ++axis) {
-    const values = [];
-    for (let i = 0; i < count; i += step) values.push(position[3 * i + axis]);
-    values.sort((a, b) => a - b);
+    const values = Float32Array.from({ length: Math.ceil(count / step) }, (_, i) => position[3 * step * i + axis]).sort();
     low.setComponent(axis, values[Math.floor(0.01 * values.length)]);
     high.setComponent(axis, values[Math.ceil(0.99 * values.length) - 1]);
   }

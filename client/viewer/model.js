@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { gradientOf, observabilityColour } from "./colour.js";
 import { addSwitch, element, facts, onKey, sayKeys, warn } from "./panel.js";
+import { FlatMaterial } from "./shading.js";
 import { Stage, frameLines, labelAt } from "./stage.js";
 import { DISC_RADIUS, bytesOf, discs, floatsOf, matrixOf, vectorOf } from "./wire.js";
 
@@ -12,7 +13,7 @@ export function showModel({ model, shape }) {
   const stage = new Stage({ pole: new THREE.Vector3(0, 0, 1), front: new THREE.Vector3(-0.55, -0.85, 0) });
   const diameter = 1000 * model.diameter;
   const centre = vectorOf(model.boundingBoxMin, 500).add(vectorOf(model.boundingBoxMax, 500));
-  const surface = observabilityMap(shape, diameter);
+  const surface = observabilityMap(shape, diameter, stage.pole);
   const pairs = pairLines(shape);
   const symmetry = symmetryLines(model, centre, diameter);
   const frame = frameLines(0.5 * diameter);
@@ -33,7 +34,7 @@ export function showModel({ model, shape }) {
   home(OBLIQUE);
 }
 
-function observabilityMap(shape, diameter) {
+function observabilityMap(shape, diameter, pole) {
   const geometry = discs(floatsOf(shape.surface), floatsOf(shape.normals), DISC_RADIUS * diameter);
   const shares = floatsOf(shape.observability);
   const corners = geometry.userData.cornersPerPoint;
@@ -43,7 +44,7 @@ function observabilityMap(shape, diameter) {
     for (let k = 0; k < corners; ++k) colour.toArray(colours, 3 * (corners * i + k));
   });
   geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-  return new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.8, side: THREE.DoubleSide }));
+  return new THREE.Mesh(geometry, new FlatMaterial(pole, { vertexColors: true }));
 }
 
 /** Two lines a pair, P to Q1 and P to Q2, in the order of the pairs, so that the first n can be drawn alone. */

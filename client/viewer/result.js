@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { cloudPoints } from "./cloud.js";
 import { gradientOf, scoreColour } from "./colour.js";
 import { addSwitch, element, facts, onKey, sayKeys, warn } from "./panel.js";
+import { FlatMaterial } from "./shading.js";
 import { Stage, frameLines } from "./stage.js";
 import { cloudOf, matrixOf, millimetresPer, surfaceOf, vectorOf } from "./wire.js";
 
@@ -19,7 +20,7 @@ export function showResult(data) {
   const smallest = Math.min(...data.models.map(({ model }) => 1000 * model.diameter));
   const points = cloudPoints(stage, cloud, sensor, MEASURED_PART * smallest);
   const shapes = new Map(data.models.map((entry) => [entry.model.id, new PartShape(entry)]));
-  const found = group(data.answer.hypotheses, (h) => shapes.get(h.modelId).solid(matrixOf(h.pose, unit), scoreColour(h.score)));
+  const found = group(data.answer.hypotheses, (h) => shapes.get(h.modelId).solid(matrixOf(h.pose, unit), scoreColour(h.score), stage.pole));
   const rejected = group(data.answer.rejected, (h) => shapes.get(h.modelId).outline(matrixOf(h.pose, unit), "#ff5d8f", 0.18));
   const truth = group(data.truth?.instances, (t) => [...shapes.values()][0].outline(new THREE.Matrix4().set(...t.pose), "#ffffff", 0));
   stage.scene.add(points, found, rejected, truth);
@@ -76,9 +77,8 @@ class PartShape {
     this.edges = hasEdges ? new THREE.EdgesGeometry(this.surface, EDGE_ANGLE) : null;
   }
 
-  solid(matrix, colour) {
-    const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.62, metalness: 0.05, side: THREE.DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+  solid(matrix, colour, pole) {
+    const material = new FlatMaterial(pole, { colour, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     const part = place(new THREE.Mesh(this.surface, material), matrix);
     if (this.edges) {
       const line = new THREE.LineBasicMaterial({ color: colour.clone().multiplyScalar(0.25) });
@@ -154,10 +154,8 @@ class PartList {
     }
     this.selected = i;
     this.found.children.forEach((part, k) => {
-      part.material.emissive.copy(part.material.color).multiplyScalar(k === i ? 0.35 : 0);
-      part.material.transparent = i !== null && k !== i;
-      part.material.opacity = part.material.transparent ? 0.35 : 1;
-      part.material.needsUpdate = true;
+      part.material.glow = k === i ? 0.35 : 0;
+      part.material.fade(i === null || k === i ? 1 : 0.35);
     });
     this.frame.visible = i !== null;
     this.variants.clear();

@@ -7,12 +7,18 @@ const FIELD_OF_VIEW = 32; // degrees
 const SCALE_BAR_PIXELS = 140; // at most
 
 /** Smooth edges cost nothing on a graphics card, and a second of each picture of a large cloud without one. */
-function hasGraphicsCard() {
-  const gl = document.createElement("canvas").getContext("webgl2");
+function newRenderer() {
+  const attributes = { alpha: false, antialias: false, preserveDrawingBuffer: true };
+  const make = () => document.createElement("canvas").getContext("webgl2", attributes);
+  let gl = make(); // where it is drawn in software, this is slow: once is enough
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const renderer = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
-  gl?.getExtension("WEBGL_lose_context")?.loseContext(); // browsers keep few
-  return !/swiftshader|llvmpipe|softpipe/i.test(renderer);
+  const isSoftware = names && /swiftshader|llvmpipe|softpipe/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+  if (gl && !isSoftware) {
+    gl.getExtension("WEBGL_lose_context")?.loseContext(); // browsers keep few
+    attributes.antialias = true;
+    gl = make();
+  }
+  return new THREE.WebGLRenderer(gl ? { canvas: gl.canvas, context: gl } : attributes);
 }
 
 export class Stage {
@@ -21,7 +27,7 @@ export class Stage {
     this.host = document.getElementById("stage");
     this.pole = pole.clone().normalize();
     this.front = front.clone().normalize();
-    this.renderer = new THREE.WebGLRenderer({ antialias: hasGraphicsCard(), preserveDrawingBuffer: true });
+    this.renderer = newRenderer();
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.host.prepend(this.renderer.domElement);
     this.canvas = this.renderer.domElement;
@@ -29,22 +35,12 @@ export class Stage {
     this.scene.background = new THREE.Color("#12161c");
     this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1e5);
     this.camera.up.copy(this.pole);
+    this.pixels = { value: 1 }; // uniform: of the canvas, that a millimetre at a distance of one takes
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.render());
-    this.addLights();
     this.triad = new Triad(document.getElementById("axes"));
     new ResizeObserver(() => this.resize()).observe(this.host);
     this.resize();
-  }
-
-  addLights() {
-    const sky = new THREE.HemisphereLight("#ffffff", "#5b6675", 1.5);
-    sky.position.copy(this.pole);
-    this.scene.add(sky);
-    const lamp = new THREE.DirectionalLight("#ffffff", 2.2);
-    lamp.position.set(-0.35, 0.5, 1);
-    this.camera.add(lamp, lamp.target);
-    this.scene.add(this.camera);
   }
 
   /** Looks at a sphere from `tilt` degrees off the pole; without a tilt, from where the camera stands. */
@@ -77,11 +73,6 @@ export class Stage {
     this.render();
   }
 
-  /** Size for a PointsMaterial whose points shall measure `millimetres`. */
-  pointSize(millimetres) {
-    return millimetres / Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
-  }
-
   /** Calls `act` with the nearest of `objects` under a click or tap, or with nothing. */
   onPick(objects, act) {
     let down = null;
@@ -101,8 +92,10 @@ export class Stage {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.host;
-    if (!width || !height) return;
+    if (!width || !height || (width === this.width && height === this.height)) return;
+    Object.assign(this, { width, height });
     this.renderer.setSize(width, height, false);
+    this.pixels.value = this.canvas.height / 2 / Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.render();

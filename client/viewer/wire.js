@@ -6,6 +6,7 @@ import { PLYLoader } from "three/addons/loaders/PLYLoader.js";
 import { STLLoader } from "three/addons/loaders/STLLoader.js";
 
 export function bytesOf(base64) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64 ?? "");
   const text = atob(base64 ?? "");
   const bytes = new Uint8Array(text.length);
   for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
@@ -89,10 +90,10 @@ function objGeometry(text) {
   return new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
 }
 
-/** One decagon of that radius across the normal of each point. Points are metres; `radius` is millimetres. */
+/** One hexagon of that radius across the normal of each point. Points are metres; `radius` is millimetres. */
 export function discs(points, normals, radius) {
   const count = points.length / 3;
-  const kCorners = 10;
+  const kCorners = 6;
   const position = new Float32Array(count * kCorners * 3);
   const normal = new Float32Array(count * kCorners * 3);
   const index = [];

@@ -9,6 +9,7 @@ if ! command -v qemu-system-x86_64 >/dev/null; then
   exit 77
 fi
 bin="$(cd "$1" && pwd)"
+case "$bin/" in /tmp/*|/run/*) echo "$bin cannot be seen in the machine, which has a /tmp and a /run of its own."; exit 2 ;; esac
 shift
 tests="$(cd "$(dirname "$0")" && pwd)"
 machine="$(dirname "$bin")/nfs"
@@ -57,7 +58,7 @@ for folder in proc dev; do mount --move /\$folder /all/\$folder; done
 exec switch_root /all /usr/bin/env BINPOSE_BIN=$bin /bin/sh $tests/nfs_machine.sh $*
 END
   chmod +x first/init
-  (cd first && find . | cpio --quiet -o -H newc | gzip -1) >first.cpio.gz
+  (cd first && find . | "$layer/bin/busybox" cpio -o -H newc 2>/dev/null | gzip -1) >first.cpio.gz
 }
 
 [ -d "$layer" ] || unpack_packages

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The first process of the machine that nfs.sh boots. Usage: nfs_machine.sh [TEST...]
-export PATH=/usr/sbin:/usr/bin HOME=/root BINPOSE_CLUSTER_HOSTS=namespaces
+export PATH=/usr/sbin:/usr/bin HOME=/root BINPOSE_CLUSTER_HOSTS=namespaces BINPOSE_PATIENCE=10
 mount -t sysfs sys /sys
 for folder in /tmp /run; do mount -t tmpfs memory $folder; done
 mkdir -p /run/netns /run/models /run/rpcbind /run/sendsigs.omit.d

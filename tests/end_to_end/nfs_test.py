@@ -3,15 +3,17 @@ prints its figure as one line that starts with its name."""
 
 import concurrent.futures
 import contextlib
+import tempfile
 import threading
 import time
 import unittest
+from pathlib import Path
 
 import grpc
 
 from cluster_load import PlainCaller, cloud  # before wire
 import wire
-from cluster_hosts import make_network, wait_for
+from cluster_hosts import PATIENCE, make_network, wait_for
 from cluster_test import figure, is_whole, models_of, train
 from nfs_hosts import EXPORTED, FileServer, NfsServerHost
 
@@ -64,7 +66,7 @@ def code_of(call):
 
 
 def detect(server, model_id):
-    [answer] = api(server).detect([wire.detection.DetectRequest(model_ids=[model_id], cloud=cloud(200))], timeout=100)
+    [answer] = api(server).detect([wire.detection.DetectRequest(model_ids=[model_id], cloud=cloud(200))], timeout=100 * PATIENCE)
     return answer.error.code
 
 
@@ -173,6 +175,23 @@ class FaultTest(unittest.TestCase):
         for server in servers:
             self.assertEqual(server.terminate(), 0)
         figure("end without the file server", f"{(time.monotonic() - start) / 3:.1f} s a server")
+
+    def test_a_server_ends_while_it_waits_for_the_file_server_at_its_start(self):
+        waiting = servers[1:]  # by "hard" mounts
+        for server in waiting:
+            server.kill()
+        files.pull_the_plug()
+        self.addCleanup(restart, 2)
+        self.addCleanup(files.put_the_plug_back)
+        logs = [self.enterContext(tempfile.NamedTemporaryFile("w+")) for _ in waiting]
+        for server, log in zip(waiting, logs):
+            server.launch("info", stderr=log)
+        told = wait_for(lambda: all("is away since" in Path(log.name).read_text() for log in logs))
+        start = time.monotonic()
+        for server in waiting:
+            self.assertEqual(server.terminate(), 0)
+        figure("end before serving", f"the log tells after {told:.1f} s that the directory is away; ended after "
+               f"{(time.monotonic() - start) / len(waiting):.2f} s a server")
 
 
 if __name__ == "__main__":
