@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "absl/strings/str_format.h"
+#include "core/detect/all_sides.h"
 #include "core/detect/describe.h"
 #include "core/detect/prepare.h"
 #include "core/detect/rank.h"
@@ -54,7 +55,10 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
       const StageTimer timer(stats.preprocess_seconds);
       map = prepare(*view, *models[m], params, turn);
     }
-    const std::vector<Candidate> found = search(map, *models[m], static_cast<int>(m), params, turn, stats);
+    const std::vector<Candidate> found =
+        map.hides_points && params.refine
+            ? search_all_sides(*view, map, *models[m], static_cast<int>(m), params, turn, stats)
+            : search(map, *models[m], static_cast<int>(m), params, turn, stats);
     if (turn.past_deadline()) stats.stop_reason = StopReason::kDeadline;
     candidates.insert(candidates.end(), found.begin(), found.end());
     verification.push_back(final_verification(map, *models[m]));

@@ -26,6 +26,7 @@ DepthMap map_of(const SensorView& view, double diameter, const RunControl& contr
   if (hidden > kMostHidden) {
     map = depth_map(view, std::max(least, kPixelPerSpacing * view.spacing / std::sqrt(1 - hidden)), control);
     hide_behind_gaps(map, control);
+    map.hides_points = true;
   }
   return map;
 }

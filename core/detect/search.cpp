@@ -60,17 +60,6 @@ void verify_all(const DepthMap& map, const Model& model, const VerifyOptions& op
   });
 }
 
-void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
-  std::vector<std::pair<float, std::size_t>> order;  // negative: best first
-  order.reserve(candidates.size());
-  for (const Candidate& candidate : candidates) order.emplace_back(-(candidate.evidence.*merit)(), order.size());
-  std::sort(order.begin(), order.end());
-  std::vector<Candidate> sorted;
-  sorted.reserve(candidates.size());
-  for (const auto& [merit_below_0, i] : order) sorted.push_back(std::move(candidates[i]));
-  candidates = std::move(sorted);
-}
-
 Votes surface_votes(const DepthMap& map, const Model& model, const DetectParams& params, const RunControl& control,
                     DetectStats& stats) {
   const int block = std::max(1, static_cast<int>(std::lround(kRelativeBlock * model.diameter / map.pixel_size)));
@@ -195,19 +184,17 @@ std::vector<Candidate> refine_to_the_end(const DepthMap& map, const Model& model
   return candidates;
 }
 
-/// The clusters by the paper's alignment error, one a place.
+/// The clusters by the paper's alignment error: one a place, or a few where a cloud's other points decide.
 std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, const DepthMap& map, const Model& model,
                                           const DetectParams& params, DetectStats& stats) {
   const StageTimer timer(stats.verify_seconds);
-  const float cutoff = kAlignmentCutoff * static_cast<float>(model.diameter);
   for (Candidate& candidate : candidates) {
-    candidate.evidence = {};
-    candidate.evidence.area = candidate.evidence.outline_confirmed = 1;
-    candidate.evidence.explained = alignment_score(map, model, candidate.T_view_model, cutoff);
+    candidate.evidence = final_evidence(map, model, candidate.T_view_model, params);
   }
   stats.verified_count += candidates.size();
   sort_by(&Evidence::score, candidates);
-  return first_of_each_place(candidates, model, 1, params.finalist_limit, 0);
+  const int per_place = map.hides_points && params.refine ? params.finalists_per_place : 1;
+  return first_of_each_place(candidates, model, per_place, params.finalist_limit, 0);
 }
 
 }  // namespace
@@ -216,6 +203,28 @@ VerifyOptions final_verification(const DepthMap& map, const Model& model) {
   VerifyOptions options;
   options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
   return options;
+}
+
+Evidence final_evidence(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
+                        const DetectParams& params) {
+  if (params.verification == Verification::kVisibleSurface) {
+    return verify(map, model, T_view_model, final_verification(map, model));
+  }
+  Evidence evidence;
+  evidence.area = evidence.outline_confirmed = 1;
+  evidence.explained = alignment_score(map, model, T_view_model, kAlignmentCutoff * static_cast<float>(model.diameter));
+  return evidence;
+}
+
+void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
+  std::vector<std::pair<float, std::size_t>> order;  // negative: best first
+  order.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) order.emplace_back(-(candidate.evidence.*merit)(), order.size());
+  std::sort(order.begin(), order.end());
+  std::vector<Candidate> sorted;
+  sorted.reserve(candidates.size());
+  for (const auto& [merit_below_0, i] : order) sorted.push_back(std::move(candidates[i]));
+  candidates = std::move(sorted);
 }
 
 bool is_allowed(const DepthMap& map, const Model& model, int model_index, const SearchSpace& space, const Slack& slack,

@@ -17,6 +17,13 @@ VerifyOptions final_verification(const DepthMap& map, const Model& model);
 bool is_allowed(const DepthMap& map, const Model& model, int model_index, const SearchSpace& space, const Slack& slack,
                 const Eigen::Isometry3f& T_view_model);
 
+/// What speaks for a refined pose, in the way that the parameters ask for.
+Evidence final_evidence(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
+                        const DetectParams& params);
+
+/// Most merit first; equal ones in their order.
+void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates);
+
 /// Where one model may be: votes of both sources, clusters, coarse verification, refinement, final verification.
 /// Unranked, with doubles. Counts and times are added to `stats`. Ends early when `control` interrupts.
 std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,

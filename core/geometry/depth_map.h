@@ -34,6 +34,8 @@ struct DepthMap {
   std::vector<SurfacePoint> pixels;
   std::vector<std::uint8_t> background;  ///< 1: belongs to the support plane
 
+  bool hides_points = false;  ///< the cloud holds many points behind the map's: see hidden_surfaces.h
+
   std::vector<ContourPoint> contours;  ///< see contours.h
   std::vector<int> contour_at;         ///< per pixel: index into `contours`, or -1
 

@@ -64,4 +64,17 @@ void hide_behind_gaps(DepthMap& map, const RunControl& control) {
   }
 }
 
+SensorView from_behind(const SensorView& view, const RunControl& control) {
+  PointCloud cloud;  // in the view's frame
+  cloud.points = view.points;
+  cloud.normals = view.normals;
+  cloud.width = static_cast<std::uint32_t>(view.points.size());
+  cloud.height = 1;
+  cloud.sensor_position.z() = 2 * static_cast<double>(view.median_depth);
+  absl::StatusOr<SensorView> behind = sensor_view(cloud, control);
+  if (!behind.ok()) return {};
+  behind->T_scene_view = view.T_scene_view * behind->T_scene_view;
+  return *std::move(behind);
+}
+
 }  // namespace binpose

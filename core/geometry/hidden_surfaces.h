@@ -14,4 +14,8 @@ double hidden_share(const SensorView& view, const DepthMap& map);
 /// `control` interrupts.
 void hide_behind_gaps(DepthMap& map, const RunControl& control = {});
 
+/// The points as seen from as far behind their median depth as the sensor is before it: the farthest comes first.
+/// Points that such a view does not have before it are left out; without any when `control` stops it.
+SensorView from_behind(const SensorView& view, const RunControl& control = {});
+
 }  // namespace binpose

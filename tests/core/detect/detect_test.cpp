@@ -127,13 +127,23 @@ TEST(Detect, DoesNotNeedTheOrderOfThePoints) {
 
 TEST(Detect, FindsAPartInACloudOfAllItsSides) {
   const Model model = testing::quick_model(testing::l_block());
-  const std::vector<testing::PlacedMesh> blocks = four_blocks();
-  for (const int i : {0, 2, 3}) {  // with nothing around, the other looks the same turned by 180 degrees
-    const Pose& truth = blocks[i].T_scene_mesh;
-    const PointCloud cloud = testing::all_sides(testing::l_block(), truth, 0.01 * model.diameter);
+  for (const testing::PlacedMesh& block : four_blocks()) {  // one looks the same turned, to who sees one side of it
+    const PointCloud cloud = testing::all_sides(testing::l_block(), block.T_scene_mesh, 0.01 * model.diameter);
     const DetectResult result = *search(cloud, model);
     ASSERT_FALSE(result.hypotheses.empty());
-    EXPECT_TRUE(right(result.hypotheses.front(), truth, model));
+    EXPECT_TRUE(right(result.hypotheses.front(), block.T_scene_mesh, model));
+  }
+}
+
+TEST(Detect, GivesTheSameBitsOfACloudOfAllSidesOnAnyNumberOfThreads) {
+  const Model model = testing::quick_model(testing::l_block());
+  const PointCloud cloud =
+      testing::all_sides(testing::l_block(), four_blocks()[1].T_scene_mesh, 0.015 * model.diameter);
+  const DetectResult one = *search(cloud, model, {}, {.threads = 1}), three = *search(cloud, model, {}, {.threads = 3});
+  ASSERT_EQ(one.hypotheses.size(), three.hypotheses.size());
+  for (std::size_t i = 0; i < one.hypotheses.size(); ++i) {
+    EXPECT_EQ(one.hypotheses[i].T_scene_model.matrix(), three.hypotheses[i].T_scene_model.matrix());
+    EXPECT_EQ(one.hypotheses[i].score, three.hypotheses[i].score);
   }
 }
 

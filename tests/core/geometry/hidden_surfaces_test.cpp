@@ -66,5 +66,25 @@ TEST(HiddenSurfaces, AreNoneOnOneSlantedSurfaceOrBehindAWideHole) {
   EXPECT_GT(count_measured(map), 0.97 * before);
 }
 
+TEST(HiddenSurfaces, ComeFirstFromBehind) {
+  const SensorView view = sensor_view(testing::all_sides(testing::l_block(), kPlace, 0.003)).value();
+  const SensorView behind = from_behind(view);
+  ASSERT_EQ(behind.points.size(), view.points.size());
+  for (std::size_t i = 0; i < view.points.size(); ++i) {
+    const Eigen::Vector3d p = view.T_scene_view * view.points[i].cast<double>();
+    EXPECT_LT((behind.T_scene_view * behind.points[i].cast<double>() - p).norm(), 1e-6) << "the same place";
+  }
+  EXPECT_NEAR(behind.median_depth, view.median_depth, 0.03F);
+  const auto mean_z = [](const DepthMap& map) {  // of what comes first, in the scene
+    double sum = 0;
+    for (std::size_t i = 0; i < map.pixels.size(); ++i) {
+      if (map.measured(static_cast<int>(i))) sum += (map.T_scene_view * map.pixels[i].position.cast<double>()).z();
+    }
+    return sum / count_measured(map);
+  };
+  const double thickness = 0.02;  // nearly the block's
+  EXPECT_GT(mean_z(depth_map(behind, 0.004)), mean_z(depth_map(view, 0.004)) + thickness);
+}
+
 }  // namespace
 }  // namespace binpose
