@@ -10,7 +10,8 @@
 namespace binpose {
 namespace {
 
-constexpr float kReach = 0.05F;  // diameters
+constexpr float kReach = 0.05F;    // diameters
+constexpr float kMostCells = 100;  // along each axis
 constexpr int kIterations = 8;
 constexpr std::size_t kMostPoints = 1000;  // that a pose is refined with
 constexpr int kFewestPoints = 12;
@@ -103,10 +104,12 @@ std::vector<std::uint32_t> WholeCloud::in_box(const Eigen::AlignedBox3f& box,
 
 WholeSurface::WholeSurface(const Model& model)
     : model_(model),
-      cell_(kReach * static_cast<float>(model.diameter)),
+      // The second counts only where a model's box does not fit its diameter: it bounds the cells.
+      cell_(std::max(kReach * static_cast<float>(model.diameter),
+                     static_cast<float>((model.box_max - model.box_min).cwiseAbs().maxCoeff()) / kMostCells)),
       box_(model.box_min.cast<float>() - Eigen::Vector3f::Constant(cell_),
            model.box_max.cast<float>() + Eigen::Vector3f::Constant(cell_)) {
-  size_ = (box_.sizes().array() / cell_).cast<int>() + 1;
+  size_ = (box_.sizes().array() / cell_).max(0.0F).cast<int>() + 1;
   first_.assign(static_cast<std::size_t>(size_.prod()) + 1, 0);
   std::vector<int> cells;
   for (const SurfacePoint& point : model.surface) {
