@@ -73,9 +73,8 @@ void HangGuard::tell(const std::stop_token& stop) {
       is_told = true;
       spdlog::warn(
           "The model directory {} is away since {}: {} What is in memory is served meanwhile, what needs the directory "
-          "waits or fails. Look at its mount in /proc/mounts, at what `dmesg` says of its file server, and whether "
-          "that "
-          "can be reached.",
+          "waits or fails. Look at its mount in /proc/mounts, at what `dmesg` says of its file server, "
+          "and whether that can be reached.",
           directory_.string(), time_of_day(age()), fault.ok() ? "it does not answer." : std::string(fault.message()));
     }
   });

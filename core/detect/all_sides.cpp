@@ -21,9 +21,6 @@ constexpr double kNearShare = 0.4;  // of the time left before a deadline
 constexpr double kFarShare = 0.6;   // of what is left then
 constexpr float kThinning = 0.5F;   // pixels between the points that poses are held by
 constexpr float kGate = 0.015F;     // diameters
-constexpr float kSamePlace = 0.6F;  // between centres, diameters
-/// Share of what a pose explains that one that outdoes it explains, too; with less they are two parts side by side.
-constexpr double kSameSurface = 0.7;
 
 /// What search() finds from the other side, in the view's frame.
 std::vector<Candidate> search_from_behind(const SensorView& view, const Model& model, int model_index,
@@ -72,7 +69,7 @@ bool is_outdone(const Claim& claim, const Claim& other, float diameter) {
   std::vector<std::uint32_t> common;
   std::set_intersection(claim.points.begin(), claim.points.end(), other.points.begin(), other.points.end(),
                         std::back_inserter(common));
-  if (static_cast<double>(common.size()) < kSameSurface * static_cast<double>(claim.points.size())) return false;
+  if (static_cast<float>(common.size()) < kSameSurface * static_cast<float>(claim.points.size())) return false;
   const float lead = static_cast<float>(claim.points.size()) - static_cast<float>(other.points.size());
   return likelihood_ratio(lead, kThinning) <= kRuledOut;
 }

@@ -56,7 +56,7 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
       map = prepare(*view, *models[m], params, turn);
     }
     const std::vector<Candidate> found =
-        map.hides_points && params.refine
+        all_points_decide(map, params)
             ? search_all_sides(*view, map, *models[m], static_cast<int>(m), params, turn, stats)
             : search(map, *models[m], static_cast<int>(m), params, turn, stats);
     if (turn.past_deadline()) stats.stop_reason = StopReason::kDeadline;

@@ -136,18 +136,21 @@ Matrix6d by_motion(const NormalEquations& equations) {
   return swapped;
 }
 
-/// The step that solves the equations, damped; rotations are damped as what they do at the part's radius.
+/// The step that solves the equations.
 Eigen::Matrix<float, 6, 1> solve(const NormalEquations& equations, float radius) {
-  Matrix6d A = normal_matrix(equations);
-  Eigen::Matrix<double, 6, 1> b;
+  Twist b;
   for (int r = 0; r < 6; ++r) b[r] = equations.b[r];
-  const double damping = kDamping * A.diagonal().tail<3>().sum() / 3;
-  A.diagonal().head<3>().array() += damping * radius * radius;
-  A.diagonal().tail<3>().array() += damping;
-  return A.ldlt().solve(b).cast<float>();
+  return damped_step(normal_matrix(equations), b, kDamping, radius).cast<float>();
 }
 
 }  // namespace
+
+Twist damped_step(Matrix6d A, const Twist& b, double damping, double radius) {
+  const double added = damping * A.diagonal().tail<3>().sum() / 3;
+  A.diagonal().head<3>().array() += added * radius * radius;
+  A.diagonal().tail<3>().array() += added;
+  return A.selfadjointView<Eigen::Lower>().ldlt().solve(b);
+}
 
 Eigen::Isometry3f refine(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
                          const RefineOptions& options) {

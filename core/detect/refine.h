@@ -27,6 +27,11 @@ struct Information {
   double surface_count = 0;  ///< surface points that are drawn
 };
 
+/// The Gauss-Newton step of a pose that solves A step = b, rotations before translations; of A the lower triangle
+/// counts. Damped by that share of the translations' mean curvature, which holds what A leaves free; rotations as what
+/// they do at `radius`.
+Twist damped_step(Matrix6d A, const Twist& b, double damping, double radius);
+
 /// The normal matrices of one step of refinement, from all that lies within `gate` metres.
 Information information_of(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model, float gate);
 

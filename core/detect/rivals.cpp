@@ -9,11 +9,7 @@
 namespace binpose {
 namespace {
 
-// Lengths as shares of the diameter.
-constexpr float kSamePlace = 0.6F;  // between centres
-constexpr double kSamePose = 0.1;   // poses that move no corner of the box farther apart are one
-/// Share of what a pose explains that a rival explains, too; with less they are two parts side by side.
-constexpr float kSameSurface = 0.7F;
+constexpr double kSamePose = 0.1;  // diameters; poses that move no corner of the box farther apart are one
 
 /// What the scan says to a visible point of a pose.
 struct Claim {

@@ -193,7 +193,7 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
   }
   stats.verified_count += candidates.size();
   sort_by(&Evidence::score, candidates);
-  const int per_place = map.hides_points && params.refine ? params.finalists_per_place : 1;
+  const int per_place = all_points_decide(map, params) ? params.finalists_per_place : 1;
   return first_of_each_place(candidates, model, per_place, params.finalist_limit, 0);
 }
 

@@ -21,6 +21,12 @@ bool is_allowed(const DepthMap& map, const Model& model, int model_index, const 
 Evidence final_evidence(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
                         const DetectParams& params);
 
+/// Whether points that the map does not show decide between poses (see all_sides.h): poses that nothing has refined are
+/// too rough to be compared so.
+inline bool all_points_decide(const DepthMap& map, const DetectParams& params) {
+  return map.hides_points && params.refine;
+}
+
 /// Most merit first; equal ones in their order.
 void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates);
 

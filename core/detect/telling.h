@@ -11,6 +11,10 @@ namespace binpose {
 /// Measured in front by less than this share of the diameter: not another part that hides the point, but this one, in
 /// another pose.
 inline constexpr float kOwnDepth = 0.08F;
+/// Between the centres of poses that may be of one part, as a share of the diameter.
+inline constexpr float kSamePlace = 0.6F;
+/// Share of what a pose explains that another explains, too; with less they are two parts side by side.
+inline constexpr float kSameSurface = 0.7F;
 /// Poses less likely than this against the best are ruled out.
 inline constexpr float kRuledOut = 0.05F;
 

@@ -1,11 +1,11 @@
 #include "core/detect/whole_cloud.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "absl/container/flat_hash_set.h"
+#include "core/detect/refine.h"
 
 namespace binpose {
 namespace {
@@ -35,13 +35,6 @@ struct Step {
     A.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
     b += weight * distance * row;
     ++count;
-  }
-  /// Rotations are damped as what they do at the part's radius.
-  Eigen::Matrix<float, 6, 1> solve(double radius) {
-    const double damping = kDamping * A.diagonal().tail<3>().sum() / 3;
-    A.diagonal().head<3>().array() += damping * radius * radius;
-    A.diagonal().tail<3>().array() += damping;
-    return A.selfadjointView<Eigen::Lower>().ldlt().solve(b).cast<float>();
   }
 };
 
@@ -163,7 +156,8 @@ Eigen::Isometry3f WholeSurface::refine(const WholeCloud& cloud, const Eigen::Iso
       if (surface != nullptr) step.add(p - centre, surface->normal, surface->normal.dot(p - surface->position), now);
     }
     if (step.count < kFewestPoints) break;
-    const Eigen::Matrix<float, 6, 1> motion = step.solve(0.5 * model_.diameter);
+    const Eigen::Matrix<float, 6, 1> motion =
+        damped_step(step.A, step.b, kDamping, 0.5 * model_.diameter).cast<float>();
     if (!motion.allFinite()) break;
     T = T * Eigen::Translation3f(motion.tail<3>()) * turn_about(centre, rotation_by(motion.head<3>()));
   }

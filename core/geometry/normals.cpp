@@ -20,14 +20,12 @@ constexpr float kMuchQuieter = 0.7F;
 constexpr float kOnPlane = 2.0F;  // deviations that a point of the plane may be off it
 
 /// The measured points of a map as inverse depth over the image, one array each, with a margin of nothing measured.
-struct RayImage {
-  int stride, margin;
+struct RayImage : MarginLayout {
   std::vector<float> x, y;  ///< tangents of the ray through the point
   std::vector<float> z, w;  ///< depth and inverse depth; 0: nothing measured
 
-  RayImage(const DepthMap& map, int margin, int threads) : stride(map.width + 2 * margin + kLanes), margin(margin) {
-    const std::size_t count = static_cast<std::size_t>(stride) * (map.height + 2 * margin);
-    for (std::vector<float>* values : {&x, &y, &z, &w}) values->assign(count, 0);
+  RayImage(const DepthMap& map, int radius, int threads) : MarginLayout(map, radius) {
+    for (std::vector<float>* values : {&x, &y, &z, &w}) values->assign(size, 0);
     parallel_for(map.height, threads, [&](int v) {
       for (int u = 0; u < map.width; ++u) {
         const Eigen::Vector3f& p = map.pixels[static_cast<std::size_t>(v) * map.width + u].position;
@@ -40,7 +38,6 @@ struct RayImage {
       }
     });
   }
-  std::size_t at(int u, int v) const { return static_cast<std::size_t>(v + margin) * stride + u + margin; }
 };
 
 /// Sums of a least-squares fit of w = a x + b y + c, relative to the window's centre; eight windows at a time.
@@ -191,10 +188,14 @@ double normal_error(double noise, double pixel_size, int radius) {
   return noise / (pixel_size * std::sqrt(sum_sq_offset));
 }
 
-WindowPlanes::WindowPlanes(const DepthMap& map, int radius) : radius(radius), stride(map.width + 2 * radius + kLanes) {
-  const std::size_t count = static_cast<std::size_t>(stride) * (map.height + 2 * radius);
-  for (std::vector<float>* values : {&normal_x, &normal_y, &normal_z, &offset}) values->assign(count, 0);
-  deviation.assign(count, INFINITY);
+MarginLayout::MarginLayout(const DepthMap& map, int radius)
+    : radius(radius),
+      stride(map.width + 2 * radius + kLanes),
+      size(static_cast<std::size_t>(stride) * (map.height + 2 * radius)) {}
+
+WindowPlanes::WindowPlanes(const DepthMap& map, int radius) : MarginLayout(map, radius) {
+  for (std::vector<float>* values : {&normal_x, &normal_y, &normal_z, &offset}) values->assign(size, 0);
+  deviation.assign(size, INFINITY);
 }
 
 WindowPlanes estimate_normals(DepthMap& map, int radius, const RunControl& control) {

@@ -10,17 +10,23 @@ namespace binpose {
 /// Surface seen under a smaller cosine (80 degrees off the ray) counts as not seen.
 constexpr float kGrazingCosine = 0.17364818F;
 
-/// The planes through the windows around pixels, normal . point = offset, view frame; one array each, with a margin of
-/// unknown planes so that eight neighbours can be read at once.
-struct WindowPlanes {
+/// Where pixels are in arrays with a margin of the windows' radius around the image, and room to read eight at once.
+struct MarginLayout {
   int radius, stride;
+  std::size_t size;
+
+  MarginLayout(const DepthMap& map, int radius);
+  std::size_t at(int u, int v) const { return static_cast<std::size_t>(v + radius) * stride + u + radius; }
+};
+
+/// The planes through the windows around pixels, normal . point = offset, view frame; one array each.
+struct WindowPlanes : MarginLayout {
   std::vector<float> normal_x, normal_y, normal_z;  ///< zero: not known
   std::vector<float> offset;                        ///< metres
   std::vector<float> deviation;  ///< standard deviation of the window's points from it, metres; infinite: not known
 
   /// None is known.
   WindowPlanes(const DepthMap& map, int radius);
-  std::size_t at(int u, int v) const { return static_cast<std::size_t>(v + radius) * stride + u + radius; }
   Eigen::Vector3f normal(std::size_t i) const { return {normal_x[i], normal_y[i], normal_z[i]}; }
 };
 
