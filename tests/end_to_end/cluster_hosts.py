@@ -68,6 +68,7 @@ class Host:
 
     def __init__(self, name, number):
         self.name, self.address, self.process = name, f"{NETWORK}.{number}", None
+        self.target = f"{self.address}:50051"  # where it serves calls, if it does
         if HAS_NAMESPACES:
             ip("netns", "add", name)
             ip("link", "add", f"to-{name}", "type", "veth", "peer", "name", "eth0", "netns", name)
@@ -102,7 +103,7 @@ class ServerHost(Host):
 
     def __init__(self, name, number, shared, *arguments):
         super().__init__(name, number)
-        self.shared, self.arguments, self.target = shared, arguments, f"{self.address}:50051"
+        self.shared, self.arguments = shared, arguments
         self.models = shared.parent / f"models-{name}"
         self.models.symlink_to(shared)
 
@@ -111,7 +112,7 @@ class ServerHost(Host):
         wait_for(self.is_ready, what=f"that {self.name} is ready")
 
     def launch(self, log_level, **options):
-        self.run(BIN / "binpose-server", "--listen", f"{self.address}:50051", "--metrics", f"{self.address}:9464",
+        self.run(BIN / "binpose-server", "--listen", self.target, "--metrics", f"{self.address}:9464",
                  "--model-dir", self.models, "--threads", "1", "--log-level", log_level, "--drain-delay", "2",
                  *([] if "--tls-cert" in self.arguments else ["--insecure"]), *self.arguments,
                  stdout=subprocess.DEVNULL, **options)
@@ -145,13 +146,12 @@ class BalancerHost(Host):
 
     def __init__(self, directory, servers, number=2, name="balancer", tls=None):
         super().__init__(name, number)
-        text = CONFIG.read_text().replace("bind :50051", f"bind {self.address}:50051")
+        text = CONFIG.read_text().replace("bind :50051", f"bind {self.target}")
         for i, server in enumerate(servers):
             text = text.replace(f"192.0.2.{11 + i}", server.address)
         self.config = directory / f"{name}.cfg"
         self.config.write_text(text.replace("127.0.0.1:8404", f"{self.address}:8404"))
         self.environment = {**os.environ, **({"TLS_DIR": str(tls)} if tls else {})}
-        self.target = f"{self.address}:50051"
 
     def start(self):
         self.run(shutil.which("haproxy"), "-db", "-q", "-f", self.config, env=self.environment, stderr=subprocess.DEVNULL)

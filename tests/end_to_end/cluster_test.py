@@ -47,6 +47,7 @@ def train(api, model_id):
 
 
 @functools.cache
+@functools.cache  # encoded once, so that nobody's time counts it
 def large_request():
     """A scan of 3.6 MB for a model that is not there, encoded."""
     points = wire.types.PackedPoints(width=300_800, height=1, xyz=bytes(3_609_600))
@@ -69,7 +70,7 @@ def seconds_each(api):
 
 
 def models_of(server):
-    return {(m.id, m.generation, m.content_hash) for m in wire.Api(f"{server.address}:50051").models()}
+    return {(m.id, m.generation, m.content_hash) for m in wire.Api(server.target).models()}
 
 
 def is_whole(file):
@@ -188,11 +189,11 @@ class ClusterTest(unittest.TestCase):
                     wait_for(lambda: "model directory has not been read" in server.page("/readyz"))
                     self.assertGreater(server.metric("binpose_model_directory_age_seconds"), 4)
                     with self.assertRaises(grpc.RpcError) as caught:
-                        train(wire.Api(f"{server.address}:50051"), IDS[0])
+                        train(wire.Api(server.target), IDS[0])
                     self.assertEqual(caught.exception.code(), grpc.StatusCode.UNAVAILABLE)
                 others = [server for server in servers if server not in cut]
                 for server in others:
-                    train(wire.Api(f"{server.address}:50051"), IDS[0])
+                    train(wire.Api(server.target), IDS[0])
                 for server in cut:
                     server.join()
                 caught_up = wait_for(lambda: len({frozenset(models_of(server)) for server in servers}) == 1)
@@ -202,7 +203,7 @@ class ClusterTest(unittest.TestCase):
     def test_trainings_at_once_are_generations_in_a_row(self):
         count, model_ids = (200, IDS) if FULL else (9, IDS[:3])
         before = {model_id: max(g for i, g, _ in models_of(servers[0]) if i == model_id) for model_id in model_ids}
-        apis = [wire.Api(f"{server.address}:50051") for server in servers]
+        apis = [wire.Api(server.target) for server in servers]
         start = time.monotonic()
         with concurrent.futures.ThreadPoolExecutor(count) as pool:
             done = list(pool.map(lambda i: train(apis[i % 3], model_ids[i // 3 % len(model_ids)]), range(count)))

@@ -34,7 +34,6 @@ class NfsServerHost(ServerHost):
     def __init__(self, name, number, files, options):
         Host.__init__(self, name, number)
         self.models = Path(f"/run/{name}")
-        self.target = f"{self.address}:50051"
         self.models.mkdir()
         export = "/" if "vers=4" in options else EXPORTED
         subprocess.run(["unshare", "--uts", "sh", "-c",  # to a file server of version 4, clients of one name are one
