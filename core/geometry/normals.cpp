@@ -114,7 +114,8 @@ void fit_row(DepthMap& map, const RayImage& rays, int v, int radius, WindowPlane
     store_lanes(b * scale, &planes.normal_y[to]);
     store_lanes(c * scale, &planes.normal_z[to]);
     store_lanes((a * x0 + b * y0 + c) * z0 * scale, &planes.offset[to]);
-    store_lanes(good & (z0 > 0) ? off : zero + INFINITY, &planes.deviation[to]);
+    const LaneInts known = good & (z0 > 0);
+    store_lanes(known ? off : zero + INFINITY, &planes.deviation[to]);
     for (int lane = 0; lane < std::min(kLanes, map.width - u); ++lane) {
       const int i = v * map.width + u + lane;
       if (!map.measured(i)) continue;
