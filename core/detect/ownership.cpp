@@ -12,22 +12,28 @@ constexpr double kTrace = 0.02;    // of the visible surface
 
 }  // namespace
 
-void own_pixels(const DepthMap& map, const Model& model, const Candidate& candidate, float tolerance, int index,
-                std::vector<int>& owner) {
-  for (const std::uint16_t point : visible_points(model, candidate.T_view_model)) {
-    const Eigen::Vector3f p = candidate.T_view_model * model.surface[point].position;
+std::vector<int> explained_pixels(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
+                                  float tolerance) {
+  const std::vector<std::uint16_t>& visible = visible_points(model, T_view_model);
+  std::vector<int> pixels(9 * visible.size());
+  int* end = pixels.data();
+  for (const std::uint16_t point : visible) {
+    const Eigen::Vector3f p = T_view_model * model.surface[point].position;
     const int pixel = p.z() > 0 ? map.pixel_of(p) : -1;
     if (pixel < 0) continue;
-    const Eigen::Vector3f normal = candidate.T_view_model.linear() * model.surface[point].normal;
+    const Eigen::Vector3f normal = T_view_model.linear() * model.surface[point].normal;
     const int u = pixel % map.width, v = pixel / map.width;
+    const int first = std::max(0, u - 1), last = std::min(map.width - 1, u + 1);
     for (int row = std::max(0, v - 1); row <= std::min(map.height - 1, v + 1); ++row) {
-      for (int column = std::max(0, u - 1); column <= std::min(map.width - 1, u + 1); ++column) {
-        const int i = row * map.width + column;
-        if (owner[i] == index || !map.measured(i)) continue;
-        if (std::abs(normal.dot(map.pixels[i].position - p)) <= tolerance) owner[i] = index;
+      for (int i = row * map.width + first; i <= row * map.width + last; ++i) {
+        const float distance = normal.dot(map.pixels[i].position - p);
+        *end = i;
+        end += static_cast<int>(map.measured(i)) & static_cast<int>(std::abs(distance) <= tolerance);
       }
     }
   }
+  pixels.resize(end - pixels.data());
+  return pixels;
 }
 
 std::vector<int> find_occluders(const DepthMap& map, const Model& model, const Candidate& candidate, int index,
@@ -48,10 +54,10 @@ std::vector<int> find_occluders(const DepthMap& map, const Model& model, const C
   return occluders;
 }
 
-Eigen::AlignedBox2i image_box(const DepthMap& map, const Eigen::AlignedBox3f& box,
-                              const Eigen::Isometry3f& T_view_model) {
+Eigen::AlignedBox2i image_box(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model) {
   constexpr int kMargin = 2;  // the pixels around a point that are marked, and what rounding takes
   const Eigen::AlignedBox2i image(Eigen::Vector2i::Zero(), Eigen::Vector2i(map.width - 1, map.height - 1));
+  const Eigen::AlignedBox3f box(model.box_min.cast<float>(), model.box_max.cast<float>());
   Eigen::AlignedBox2f seen;
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3f p = T_view_model * box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(corner));

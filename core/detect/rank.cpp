@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/detect/ownership.h"
+#include "core/detect/places.h"
 #include "core/detect/rivals.h"
 #include "core/parallel.h"
 
@@ -14,21 +15,6 @@ namespace {
 
 /// Share of a pose's score that another must have to be worth comparing.
 constexpr float kRivalShare = 0.6F;
-/// Candidates per thread among which some to judge beside the first are looked for.
-constexpr std::size_t kAhead = 8;
-
-/// What a candidate is worth beside those accepted before.
-struct Judgement {
-  Candidate candidate;
-  Eigen::AlignedBox2i box;     // of the pixels that it was judged by
-  std::size_t accepted_count;  // of those before
-};
-
-Eigen::AlignedBox3f box_of(const std::vector<SurfacePoint>& surface) {
-  Eigen::AlignedBox3f box;
-  for (const SurfacePoint& point : surface) box.extend(point.position);
-  return box;
-}
 
 /// Candidates in line for acceptance, best first.
 class Line {
@@ -42,11 +28,11 @@ class Line {
         first_(std::move(candidates)),
         variants_(first_.size()),
         rivalries_(first_.size()),
+        pixels_(first_.size()),
         is_absent_(models.size(), false) {
     std::stable_sort(first_.begin(), first_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
-    for (const Model* model : models) surface_boxes_.push_back(box_of(model->surface));
-    for (const Candidate& candidate : first_) boxes_.push_back(box_in_image(candidate));
+    if (control.threads > 1) look_ahead();
     start_anew();
   }
 
@@ -59,14 +45,12 @@ class Line {
         passed_over_.push_back(order_[next_++]);
         continue;
       }
-      if (!is_judged(order_[next_])) judge_ahead(min_score);
       if (!stands_firm()) continue;
-      const Candidate& candidate = candidates_[order_[next_++]];
-      own_pixels(map_, *models_[candidate.model_index], candidate,
-                 options_.verification[candidate.model_index].tolerance, static_cast<int>(accepted_boxes_.size()),
-                 owner_);
-      accepted_boxes_.push_back(box_in_image(candidate));
-      accepted.push_back(candidate);
+      const int i = order_[next_++];
+      if (pixels_[i].empty()) pixels_[i] = pixels_of(i);
+      for (const int pixel : pixels_[i]) owner_[pixel] = static_cast<int>(accepted_boxes_.size());
+      accepted_boxes_.push_back(box_in_image(candidates_[i]));
+      accepted.push_back(candidates_[i]);
     }
     return accepted;
   }
@@ -90,7 +74,7 @@ class Line {
  private:
   void start_anew() {
     candidates_ = first_;
-    judgements_.assign(candidates_.size(), std::nullopt);
+    verified_after_.assign(candidates_.size(), std::nullopt);
     order_.resize(candidates_.size());
     std::iota(order_.begin(), order_.end(), 0);
     next_ = 0;
@@ -99,8 +83,37 @@ class Line {
     owner_.assign(map_.pixels.size(), kNobody);
   }
 
+  /// Does on all threads what does not depend on others' pixels: for all that will come to the front, and what only
+  /// those need that are accepted, for the best of each place.
+  void look_ahead() {
+    std::vector<bool> is_best;
+    while (is_best.size() < first_.size() && first_[is_best.size()].score() >= options_.min_score) {
+      is_best.push_back(is_best_of_place(is_best));
+    }
+    parallel_for(static_cast<int>(is_best.size()), control_.threads, [&](int i) {
+      if (control_.stop.stop_requested()) return;
+      variants_[i] = variant_of(first_[i]);
+      if (!is_best[i]) return;
+      rivalries_[i] = rivalry_of(i);
+      pixels_[i] = pixels_of(i);
+    });
+  }
+
+  /// Whether the candidate that follows those told of is far from the best among them.
+  bool is_best_of_place(const std::vector<bool>& is_best) const {
+    const Candidate& candidate = first_[is_best.size()];
+    const Model& model = *models_[candidate.model_index];
+    const Eigen::Vector3f centre = model.centre.cast<float>(), place = candidate.T_view_model * centre;
+    for (std::size_t i = 0; i < is_best.size(); ++i) {
+      const float distance = (first_[i].T_view_model * centre - place).norm();
+      const bool is_near = distance < kNeighbourhood * static_cast<float>(model.diameter);
+      if (is_best[i] && first_[i].model_index == candidate.model_index && is_near) return false;
+    }
+    return true;
+  }
+
   Eigen::AlignedBox2i box_in_image(const Candidate& candidate) const {
-    return image_box(map_, surface_boxes_[candidate.model_index], candidate.T_view_model);
+    return image_box(map_, *models_[candidate.model_index], candidate.T_view_model);
   }
 
   VariantChoice variant_of(const Candidate& candidate) const {
@@ -109,8 +122,9 @@ class Line {
         [&](const Eigen::Isometry3f& T_view_model) { return options_.allowed(candidate.model_index, T_view_model); });
   }
 
-  /// Compares a candidate with all that are nearly as good; others' pixels don't matter.
-  Rivalry rivalry_of(const Candidate& candidate) const {
+  /// Compares a candidate whose variant is chosen with all that are nearly as good.
+  Rivalry rivalry_of(int i) const {
+    const Candidate& candidate = first_[i];
     std::vector<Eigen::Isometry3f> others;
     for (const Candidate& other : first_) {
       if (other.model_index == candidate.model_index &&
@@ -118,61 +132,51 @@ class Line {
         others.push_back(other.T_view_model);
       }
     }
-    return weigh_rivals(map_, *models_[candidate.model_index], candidate.T_view_model, others,
+    return weigh_rivals(map_, *models_[candidate.model_index], variants_[i]->T_view_model, others,
                         options_.verification[candidate.model_index]);
   }
 
-  /// Judges a candidate anew, without the pixels of those accepted. May run beside the judging of others.
-  Judgement judge(int i) {
-    Candidate candidate = candidates_[i];
+  /// What a candidate whose variant is chosen explains.
+  std::vector<int> pixels_of(int i) const {
+    const int m = first_[i].model_index;
+    return explained_pixels(map_, *models_[m], variants_[i]->T_view_model, options_.verification[m].tolerance);
+  }
+
+  /// Judges a candidate anew, without the pixels of those accepted.
+  void judge(int i) {
+    Candidate& candidate = candidates_[i];
     const float before = candidate.score();
     if (!variants_[i]) variants_[i] = variant_of(first_[i]);
     candidate.T_view_model = variants_[i]->T_view_model;
     candidate.confidence = variants_[i]->confidence;
     candidate.rivals = variants_[i]->rivals;
-    candidate.evidence = verify(map_, *models_[candidate.model_index], candidate.T_view_model,
-                                options_.verification[candidate.model_index], &owner_);
+    if (!is_verified(i)) {
+      candidate.evidence = verify(map_, *models_[candidate.model_index], candidate.T_view_model,
+                                  options_.verification[candidate.model_index], &owner_);
+      verified_after_[i] = accepted_boxes_.size();
+    }
     // Few get so far: the doubles have lost their pixels.
-    if (!rivalries_[i] && candidate.score() >= before) rivalries_[i] = rivalry_of(candidate);
+    if (!rivalries_[i] && candidate.score() >= before) rivalries_[i] = rivalry_of(i);
     if (rivalries_[i]) {
       candidate.confidence = 1 / (1 / candidate.confidence + rivalries_[i]->odds);
       candidate.rivals.insert(candidate.rivals.end(), rivalries_[i]->rivals.begin(), rivalries_[i]->rivals.end());
     }
-    const Eigen::AlignedBox2i box = box_in_image(candidate);
-    return {std::move(candidate), box, accepted_boxes_.size()};
   }
 
-  /// Whether a candidate was judged and nothing was accepted since that could own a pixel that it was judged by.
-  bool is_judged(int i) const {
-    const std::optional<Judgement>& judgement = judgements_[i];
-    return judgement && std::all_of(accepted_boxes_.begin() + static_cast<std::ptrdiff_t>(judgement->accepted_count),
-                                    accepted_boxes_.end(),
-                                    [&](const Eigen::AlignedBox2i& box) { return !box.intersects(judgement->box); });
+  /// Whether a candidate was verified and nothing was accepted since that could own a pixel of its.
+  bool is_verified(int i) const {
+    if (!verified_after_[i]) return false;
+    const Eigen::AlignedBox2i box = box_in_image(candidates_[i]);
+    return std::none_of(accepted_boxes_.begin() + static_cast<std::ptrdiff_t>(*verified_after_[i]),
+                        accepted_boxes_.end(), [&](const Eigen::AlignedBox2i& other) { return box.intersects(other); });
   }
 
-  /// Judges the first in line, and on other threads some that come soon and have pixels of their own.
-  void judge_ahead(double min_score) {
-    const auto threads = static_cast<std::size_t>(control_.threads);
-    const std::size_t last = std::min(order_.size(), next_ + kAhead * threads);
-    std::vector<int> batch = {order_[next_]};
-    for (std::size_t k = next_ + 1; k < last && batch.size() < threads; ++k) {
-      const int i = order_[k];
-      if (candidates_[i].score() < min_score) break;
-      const bool alone =
-          std::none_of(batch.begin(), batch.end(), [&](int j) { return boxes_[i].intersects(boxes_[j]); });
-      if (alone && !is_absent_[candidates_[i].model_index] && !is_judged(i)) batch.push_back(i);
-    }
-    parallel_for(static_cast<int>(batch.size()), control_.threads,
-                 [&](int k) { judgements_[batch[k]] = judge(batch[k]); });
-  }
-
-  /// Takes the judgement of the first in line; sends it back to its place if it lost pixels to a better one or is less
-  /// sure than it seemed.
+  /// Judges the first in line; sends it back to its place if it lost pixels to a better one or is less sure than it
+  /// seemed.
   bool stands_firm() {
     const int i = order_[next_];
     const float before = candidates_[i].score();
-    candidates_[i] = std::move(judgements_[i]->candidate);
-    judgements_[i].reset();
+    judge(i);
     if (candidates_[i].score() >= before) return true;
     const auto first = order_.begin() + static_cast<std::ptrdiff_t>(next_);
     std::rotate(first, first + 1, std::upper_bound(first + 1, order_.end(), i, [&](int a, int b) {
@@ -185,15 +189,14 @@ class Line {
   const std::span<const Model* const> models_;
   const RankOptions& options_;
   const RunControl& control_;
-  std::vector<Eigen::AlignedBox3f> surface_boxes_;      // of each model
-  std::vector<Candidate> first_;                        // as they came, best first
-  std::vector<Eigen::AlignedBox2i> boxes_;              // of each candidate as it came
-  std::vector<std::optional<VariantChoice>> variants_;  // of each candidate, where chosen already
-  std::vector<std::optional<Rivalry>> rivalries_;       // the same
-  std::vector<bool> is_absent_;                         // per model: none of it is accepted
-  std::vector<Candidate> candidates_;                   // as judged so far
-  std::vector<std::optional<Judgement>> judgements_;    // not taken yet
-  std::vector<int> order_;                              // of the candidates
+  std::vector<Candidate> first_;                            // as they came, best first
+  std::vector<std::optional<VariantChoice>> variants_;      // of each candidate, where chosen already
+  std::vector<std::optional<Rivalry>> rivalries_;           // the same
+  std::vector<std::vector<int>> pixels_;                    // that each explains; empty where not looked up yet
+  std::vector<bool> is_absent_;                             // per model: none of it is accepted
+  std::vector<Candidate> candidates_;                       // as judged so far
+  std::vector<std::optional<std::size_t>> verified_after_;  // of each candidate: so many were accepted
+  std::vector<int> order_;                                  // of the candidates
   std::size_t next_ = 0;
   std::vector<int> passed_over_;  // best first
   std::vector<Eigen::AlignedBox2i> accepted_boxes_;

@@ -41,6 +41,7 @@ float explained_by(std::span<const Claim> claims) {
   return sum;
 }
 
+/// The greater prevails.
 enum class Mark : std::uint8_t { kNothing, kWrong, kRight };
 
 Mark mark_of(const Claim& claim) { return claim.weight > 0 ? Mark::kRight : Mark::kWrong; }
@@ -48,7 +49,7 @@ Mark mark_of(const Claim& claim) { return claim.weight > 0 ? Mark::kRight : Mark
 /// Where the claims of a pose are right and where wrong: cells as large as points lie apart, in a window of the image.
 class ClaimMap {
  public:
-  /// Empty; the window holds all of `claims`.
+  /// Empty; the window holds all of `claims` with two cells around them.
   ClaimMap(int image_width, int cell, std::span<const Claim> claims) : image_width_(image_width), cell_(cell) {
     if (claims.empty()) return;
     Eigen::Array2i low = cell_of(claims.front()), high = low;
@@ -56,17 +57,21 @@ class ClaimMap {
       low = low.min(cell_of(claim));
       high = high.max(cell_of(claim));
     }
-    first_ = low - 1;
-    size_ = high - low + 3;
+    first_ = low - 2;
+    size_ = high - low + 5;
     marks_.resize(size_.prod());
   }
 
   /// In place of what was marked. Each claim marks the cells around it; near both, the pose is right.
   void mark(std::span<const Claim> claims) {
     std::fill(marks_.begin(), marks_.end(), Mark::kNothing);
-    for (const Mark mark : {Mark::kWrong, Mark::kRight}) {
-      for (const Claim& claim : claims) {
-        if (mark_of(claim) == mark) mark_around(cell_of(claim) - first_, mark);
+    for (const Claim& claim : claims) {
+      const Eigen::Array2i middle = cell_of(claim) - first_;
+      if ((middle < 1).any() || (middle >= size_ - 1).any()) continue;
+      const Mark mark = mark_of(claim);
+      for (int row = middle.y() - 1; row <= middle.y() + 1; ++row) {
+        Mark* const cells = &marks_[row * size_.x() + middle.x() - 1];
+        for (int k = 0; k < 3; ++k) cells[k] = std::max(cells[k], mark);
       }
     }
   }
@@ -79,12 +84,6 @@ class ClaimMap {
  private:
   Eigen::Array2i cell_of(const Claim& claim) const {
     return {claim.pixel % image_width_ / cell_, claim.pixel / image_width_ / cell_};
-  }
-  void mark_around(const Eigen::Array2i& middle, Mark mark) {
-    const Eigen::Array2i low = (middle - 1).max(0), high = (middle + 1).min(size_ - 1);
-    for (int row = low.y(); row <= high.y(); ++row) {
-      for (int column = low.x(); column <= high.x(); ++column) marks_[row * size_.x() + column] = mark;
-    }
   }
 
   int image_width_, cell_;

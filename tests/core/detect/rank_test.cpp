@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "core/detect/ownership.h"
 #include "tests/scenes/random.h"
 #include "tests/support/scan_map.h"
@@ -195,30 +197,25 @@ TEST(Rank, IsTheSameOnAnyNumberOfThreads) {
   }
 }
 
-TEST(Ownership, IsOfPixelsInTheImageBoxOnly) {
+TEST(Ownership, ExplainedPixelsLieInTheImageBox) {
   const RankedScene scene = blocks();
-  Eigen::AlignedBox3f surface;
-  for (const SurfacePoint& point : scene.model.surface) surface.extend(point.position);
   for (const Pose& pose : scene.poses) {
     const Candidate candidate = scene.candidate(pose);
-    std::vector<int> owner(scene.map.pixels.size(), kNobody);
-    own_pixels(scene.map, scene.model, candidate, scene.options[0].tolerance, 3, owner);
-    const Eigen::AlignedBox2i box = image_box(scene.map, surface, candidate.T_view_model);
+    const std::vector<int> pixels =
+        explained_pixels(scene.map, scene.model, candidate.T_view_model, scene.options[0].tolerance);
+    const Eigen::AlignedBox2i box = image_box(scene.map, scene.model, candidate.T_view_model);
     EXPECT_LT(box.volume(), scene.map.width * scene.map.height / 3);
-    int owned = 0;
-    for (int i = 0; i < static_cast<int>(owner.size()); ++i) {
-      if (owner[i] == kNobody) continue;
-      ++owned;
+    for (const int i : pixels) {
       EXPECT_TRUE(box.contains(Eigen::Vector2i(i % scene.map.width, i / scene.map.width)));
     }
-    EXPECT_GT(owned, 200);
+    EXPECT_GT(std::set<int>(pixels.begin(), pixels.end()).size(), 200);
   }
 }
 
 TEST(Ownership, ImageBoxOfAPartAroundTheSensorIsTheWholeImage) {
   const RankedScene scene = blocks();
-  const Eigen::AlignedBox3f around(Eigen::Vector3f::Constant(-1), Eigen::Vector3f::Constant(1));
-  const Eigen::AlignedBox2i box = image_box(scene.map, around, Eigen::Isometry3f::Identity());
+  const Eigen::Isometry3f around(Eigen::Translation3f(-scene.model.centre.cast<float>()));
+  const Eigen::AlignedBox2i box = image_box(scene.map, scene.model, around);
   EXPECT_TRUE(box.contains(Eigen::Vector2i(0, 0)));
   EXPECT_TRUE(box.contains(Eigen::Vector2i(scene.map.width - 1, scene.map.height - 1)));
 }
