@@ -9,10 +9,12 @@
 
 int main(int argc, char** argv) {
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // else it tells of every sample that finds no plane
+  using namespace binpose::paper;                           // NOLINT
   CLI::App app("The experiments of the paper.");
   app.require_subcommand(1);
   std::filesystem::path parts, scenes, output;
   int count = 200;
+  Share share;
   const auto add = [&](const char* name, const char* what, const auto& run) {
     CLI::App* command = app.add_subcommand(name, what);
     command->add_option("parts", parts, "folder with parts.json")->required()->check(CLI::ExistingDirectory);
@@ -23,8 +25,10 @@ int main(int argc, char** argv) {
     command->add_option("scenes", scenes, "folder of scene folders")->required()->check(CLI::ExistingDirectory);
     command->add_option("output", output)->required();
   };
-  using namespace binpose::paper;  // NOLINT
-  with_scenes(add("table", "Table I", [&] { run_table(parts, scenes, output); }));
+  CLI::App* table = add("table", "Table I", [&] { run_table(parts, scenes, output, share); });
+  with_scenes(table);
+  table->add_option("--shares", share.count, "so many processes share the scenes")->check(CLI::Range(1, 100));
+  table->add_option("--share", share.index, "the one of these that is this process's, from 0 on");
   with_scenes(add("sweep", "Fig. 8 and 9", [&] { run_sweep(parts, scenes, output); }));
   with_scenes(add("pictures", "what Fig. 3, 6 and 7 show", [&] { write_pictures(parts, scenes, output); }));
   CLI::App* accuracy = add("accuracy", "Fig. 5", [&] { run_accuracy(parts, count, output); });

@@ -22,13 +22,14 @@ std::vector<fs::path> scene_folders(const fs::path& scenes) {
 }
 
 void measure_over_scenes(const std::string& run, const fs::path& parts_folder, const fs::path& scenes,
-                         const fs::path& output, const std::function<NamedFinders(const testing::ScenePart&)>& train) {
+                         const fs::path& output, const std::function<NamedFinders(const testing::ScenePart&)>& train,
+                         Share share) {
   std::map<std::string, testing::ScenePart> parts;
   for (const testing::ScenePart& part : testing::read_parts(parts_folder)) parts.emplace(part.name, part);
   std::map<std::string, NamedFinders> trained;
   RunLog log(output);
   const std::vector<fs::path> folders = scene_folders(scenes);
-  for (std::size_t i = 0; i < folders.size(); ++i) {
+  for (std::size_t i = share.index; i < folders.size(); i += share.count) {
     const std::string name = folders[i].filename();
     if (log.has(name)) continue;
     const testing::BinScene scene = testing::read_scene(folders[i]);

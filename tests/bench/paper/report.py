@@ -14,8 +14,10 @@ import scans
 import tables
 
 
-def read_log(path):
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+def read_logs(results, experiment):
+    """The lines of all processes that took part in an experiment."""
+    logs = sorted(results.glob(f"{experiment}*.jsonl"))
+    return [json.loads(line) for log in logs for line in log.read_text().splitlines()]
 
 
 def processor():
@@ -33,8 +35,8 @@ def put(text, name, table):
 
 def main():
     results, scenes, paper = (Path(argument) for argument in sys.argv[1:])
-    table, sweep, accuracy, pictures = (read_log(results / f"{name}.jsonl")
-                                        for name in ("table", "sweep", "accuracy", "pictures"))
+    table, sweep, accuracy, pictures = (read_logs(results, experiment)
+                                        for experiment in ("table", "sweep", "accuracy", "pictures"))
     text = paper.read_text()
     text = put(text, "setting", tables.setting(table, processor()))
     text = put(text, "recognition", tables.recognition(table))
