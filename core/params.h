@@ -60,7 +60,8 @@ struct DetectParams {
   double min_score = 0.3;  ///< [0, 1]
   /// What one pose of a model must reach for any of its poses to count, [0, 1]: its score, whatever its rivals, times
   /// its explained area where that is below 1, and less in a coarse scan that does not confirm its outline. A bin that
-  /// holds a part nearly always shows one of them well; where all poses are doubtful, the part is not there.
+  /// holds a part nearly always shows one of them well; where all poses are doubtful, the part is not there, and where
+  /// none reaches a tenth more, only those count that reach it themselves.
   double presence_score = 0.45;
   int max_results = 100;  ///< [1, 1000]
   int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]

@@ -110,7 +110,8 @@ TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
   const RankedScene scene = blocks();
   const Candidate sure = scene.candidate(scene.poses[0]), doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
   ASSERT_LT(doubtful.score(), sure.score());
-  const double between = (sure.score() + doubtful.score()) / 2;
+  const double between = 0.7 * sure.score();
+  ASSERT_LT(doubtful.score(), between);
   const Model* models[] = {&scene.model};
   const auto rank_with = [&](const std::vector<Candidate>& candidates, double presence_score) {
     return rank(scene.map, models, candidates, {scene.options, 0.1, presence_score, 5});
@@ -123,6 +124,20 @@ TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
   ASSERT_EQ(alone.rejected.size(), 1U);
   EXPECT_EQ(alone.rejected[0].score(), doubtful.score());
   EXPECT_EQ(rank_with({doubtful}, 0).accepted.size(), 1U);
+}
+
+TEST(Rank, AsksEachPoseOfAPartThatIsNotSurelyThereForProof) {
+  const RankedScene scene = blocks();
+  const Candidate better = scene.candidate(scene.poses[0]);
+  const Candidate weak = scene.candidate(shifted(scene.poses[1], 0.0015));
+  const Model* models[] = {&scene.model};
+  const auto accepted_with = [&](double presence_score) {
+    return rank(scene.map, models, {weak, better}, {scene.options, 0.1, presence_score, 0}).accepted;
+  };
+  ASSERT_LT(weak.presence(), 0.9F * better.presence());
+  EXPECT_EQ(accepted_with(0.7 * better.presence()).size(), 2U);
+  ASSERT_EQ(accepted_with(0.95 * better.presence()).size(), 1U);
+  EXPECT_EQ(accepted_with(0.95 * better.presence())[0].presence(), better.presence());
 }
 
 TEST(Rank, TakesAPoseOfWhichLittleShowsForWeakProof) {
