@@ -11,23 +11,17 @@
 namespace binpose {
 namespace {
 
-/// A part is surely there, so that other poses of it need no proof, if one pose is worth so many times what is asked
-/// for.
+/// A part is surely there, so that other poses of it need no proof, if one pose's lenient presence is so many times
+/// what is asked for.
 constexpr float kSure = 1.1F;
 
-/// The best of a model's candidates, -1 where there are none.
-struct Best {
-  float presence = -1;
-  float worth = -1;  // the same, an outline that a coarse scan does not confirm not held against it
-};
-
-std::vector<Best> best_by_model(std::span<const Candidate> candidates, std::size_t model_count) {
-  std::vector<Best> best(model_count);
+/// The best of each model's candidates by a merit, -1 where there are none.
+std::vector<float> best_by_model(float (Candidate::*merit)() const, std::span<const Candidate> candidates,
+                                 std::size_t model_count) {
+  std::vector<float> best(model_count, -1);
   for (const Candidate& candidate : candidates) {
-    Best& of_model = best[candidate.model_index];
-    const Evidence& evidence = candidate.evidence;
-    of_model.presence = std::max(of_model.presence, candidate.presence());
-    of_model.worth = std::max(of_model.worth, evidence.score() * std::min(1.0F, evidence.area));
+    float& of_model = best[candidate.model_index];
+    of_model = std::max(of_model, (candidate.*merit)());
   }
   return best;
 }
@@ -39,12 +33,13 @@ std::vector<Candidate> accept_present(CandidateLine& line, std::size_t model_cou
   const auto enough = static_cast<float>(options.presence_score);
   while (true) {
     std::vector<Candidate> accepted = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
-    const std::vector<Best> best = best_by_model(accepted, model_count);
+    const std::vector<float> presence = best_by_model(&Candidate::presence, accepted, model_count);
+    const std::vector<float> lenient = best_by_model(&Candidate::lenient_presence, accepted, model_count);
     bool is_changed = false;
     for (int m = 0; m < static_cast<int>(model_count); ++m) {
-      const bool is_absent = best[m].presence < enough;
-      if (best[m].presence < 0 || (!is_absent && best[m].worth >= kSure * enough)) continue;
-      if (is_absent) best_doubtful = std::max(best_doubtful, best[m].presence);
+      const bool is_absent = presence[m] < enough;
+      if (presence[m] < 0 || (!is_absent && lenient[m] >= kSure * enough)) continue;
+      if (is_absent) best_doubtful = std::max(best_doubtful, presence[m]);
       is_changed |= line.ask_of_each(m, is_absent ? INFINITY : enough);
     }
     if (!is_changed) return accepted;

@@ -29,6 +29,8 @@ struct Candidate {
   /// weak proof: the rim of a bin resembles many a part seen edge-on. Which of its poses is right does not matter to
   /// it.
   float presence() const { return evidence.strict_score() * std::min(1.0F, evidence.area); }
+  /// The same, an outline that a coarse scan does not confirm not held against it.
+  float lenient_presence() const { return evidence.score() * std::min(1.0F, evidence.area); }
 };
 
 /// Candidates without doubles, best first.
