@@ -39,10 +39,10 @@ for preset in "$@"; do
       run_tests asan $(cd build/asan/bin && ls -- *_test) || failed=yes
       ;;
     tsan)
-      cmake --build build/tsan --target geometry_test train_test detect_test server_parts_test
+      cmake --build build/tsan --target core_test server_parts_test
       export TSAN_OPTIONS=halt_on_error=1
       # By their names; the others work on one thread, where nothing can race.
-      GTEST_FILTER="*Threads*:*Cancel*:*Stopped*:*Deadline*" run_tests tsan geometry_test train_test detect_test ||
+      GTEST_FILTER="*Threads*:*Cancel*:*Stopped*:*Deadline*" run_tests tsan core_test ||
         failed=yes
       GTEST_FILTER="ComputePool*:HangGuard*:ModelStore*" run_tests tsan server_parts_test || failed=yes
       ;;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <type_traits>
 
 namespace binpose {
@@ -13,11 +14,7 @@ using Twist = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// The same small motions told of another point of the moving body, `shift` away from the one that they are told of.
-inline Matrix6d seen_from(const Eigen::Vector3d& shift) {
-  Matrix6d m = Matrix6d::Identity();  // translation' = translation + rotation x shift
-  m.topRightCorner<3, 3>() << 0, shift.z(), -shift.y(), -shift.z(), 0, shift.x(), shift.y(), -shift.x(), 0;
-  return m;
-}
+Matrix6d seen_from(const Eigen::Vector3d& shift);
 
 /// The turn by R about a point that stays where it is.
 template <typename Scalar>
@@ -29,16 +26,20 @@ Eigen::Transform<Scalar, 3, Eigen::Isometry> turn_about(const Eigen::Vector<Scal
   return turn;
 }
 
-/// The rotation about the direction of a vector by its length, radians.
-inline Eigen::Matrix3f rotation_by(const Eigen::Vector3f& rotation_vector) {
-  const float angle = rotation_vector.norm();
-  if (!(angle > 1e-9F)) return Eigen::Matrix3f::Identity();
-  return Eigen::AngleAxisf(angle, rotation_vector / angle).toRotationMatrix();
+/// The least turn that leads the z axis to a direction, unit; the half turn about x if that is -z. (As Eigen's
+/// FromTwoVectors, which has every file that calls it compile a singular value decomposition.)
+template <typename Scalar>
+Eigen::Quaternion<Scalar> turn_of_z_to(const Eigen::Vector<Scalar, 3>& direction) {
+  const Scalar cosine = direction.z();
+  if (!(cosine > Eigen::NumTraits<Scalar>::dummy_precision() - 1)) return {0, 1, 0, 0};
+  const Scalar twice_w = std::sqrt((1 + cosine) * 2), inverse = 1 / twice_w;
+  return {twice_w / 2, -direction.y() * inverse, direction.x() * inverse, 0};
 }
 
+/// The rotation about the direction of a vector by its length, radians.
+Eigen::Matrix3f rotation_by(const Eigen::Vector3f& rotation_vector);
+
 /// Rotation angle between two orientations, radians in [0, pi].
-inline double rotation_distance(const Pose& a, const Pose& b) {
-  return Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle();
-}
+double rotation_distance(const Pose& a, const Pose& b);
 
 }  // namespace binpose

@@ -164,8 +164,7 @@ absl::StatusOr<SensorView> sensor_view(const PointCloud& cloud, const RunControl
 
   SensorView view;
   view.is_grid = cloud.height > 1;
-  view.T_scene_view.linear() =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction.normalized()).toRotationMatrix();
+  view.T_scene_view.linear() = turn_of_z_to<double>(direction.normalized()).toRotationMatrix();
   view.T_scene_view.translation() = cloud.sensor_position;
   take_points(cloud, control, view);
   if (control.stop.stop_requested()) return control.status();

@@ -64,10 +64,6 @@ class Nearness {
   std::vector<float> near_;
 };
 
-Eigen::Matrix3f turn_towards(const Eigen::Vector3f& direction) {
-  return Eigen::Quaternionf::FromTwoVectors(Eigen::Vector3f::UnitZ(), direction).toRotationMatrix();
-}
-
 }  // namespace
 
 bool same_turn(const Eigen::Isometry3f& a, const Eigen::Isometry3f& b, float radius, float most) {
@@ -84,7 +80,7 @@ std::vector<RatedTurn> coarse_turns(const std::vector<SurfacePoint>& surface, co
   std::vector<RatedTurn> turns;
   for (const Eigen::Vector3f& direction : view_directions(kDirections)) {
     if (control.interrupted()) return {};
-    const Eigen::Matrix3f tilt = turn_towards(direction);
+    const Eigen::Matrix3f tilt = turn_of_z_to<float>(direction.normalized()).toRotationMatrix();
     for (int k = 0; k < kTurns; ++k) {
       const float angle = static_cast<float>(2 * std::numbers::pi * k / kTurns);
       const Eigen::Isometry3f T =

@@ -14,9 +14,9 @@ constexpr double kFewestViews = 0.02;
 constexpr std::size_t kMostContours = 3000;
 constexpr int kMostPairsPerPoint = 40;  // toothed parts would spend them all on a few teeth
 
-using Cell = std::tuple<int, int, int, int, int, int, int, int, int>;
+using Bucket = std::tuple<int, int, int, int, int, int, int, int, int>;
 
-Cell cell_of(const ContourPoint& c, double size) {
+Bucket bucket_of(const ContourPoint& c, double size) {
   const auto bin = [](double value, double width) { return static_cast<int>(std::floor(value / width + 0.5)); };
   const Eigen::Vector3f &p = c.position, &n = c.normal, &o = c.outward;
   return {bin(p.x(), size), bin(p.y(), size), bin(p.z(), size), bin(n.x(), 0.45), bin(n.y(), 0.45),
@@ -47,14 +47,14 @@ std::tuple<int, int, int> histogram_bin(const ContourFeature& f, double diameter
 
 std::vector<PooledContour> pool_contours(std::span<const std::vector<ContourPoint>> views, double cell,
                                          const RunControl& control) {
-  std::map<Cell, Sum> sums;
+  std::map<Bucket, Sum> sums;
   const std::size_t words = (views.size() + 63) / 64;
   for (std::size_t k = 0; k < views.size() && !control.interrupted(); ++k) {
     for (ContourPoint c : views[k]) {
       const Eigen::Vector3f in_plane = c.outward - c.normal * c.normal.dot(c.outward);
       if (in_plane.norm() < 0.5F) continue;  // the side of a rounded surface
       c.outward = in_plane.normalized();
-      Sum& sum = sums[cell_of(c, cell)];
+      Sum& sum = sums[bucket_of(c, cell)];
       sum.views.resize(words, 0);
       sum.views[k / 64] |= std::uint64_t{1} << (k % 64);
       sum.position += c.position.cast<double>();

@@ -18,7 +18,7 @@ namespace {
 constexpr double kFirstGate = 0.7 * kCoarseReach;
 constexpr double kSecondGate = kFirstGate / 2;
 constexpr double kOnSurface = 0.014;  // a point this near to the surface is on it
-constexpr double kSamePose = 0.06;    // turns that move no corner of the box farther apart are one
+constexpr double kSameTurn = 0.06;    // turns that move no corner of the box farther apart are one
 
 constexpr int kRefinements = 4;  // at each gate
 constexpr std::size_t kRefinePoints = 150;
@@ -123,7 +123,7 @@ class TurnSearch {
   }
 
   float radius() const { return diameter_ / 2; }
-  float same_pose() const { return static_cast<float>(kSamePose) * diameter_; }
+  float same_pose() const { return static_cast<float>(kSameTurn) * diameter_; }
   const Eigen::Vector3f& middle() const { return middle_; }
 
  private:

@@ -20,7 +20,7 @@ TEST(Penetration, OfFacesPressedIntoEachOtherIsTheirOverlap) {
 
 TEST(Penetration, OfACornerInAFaceIsHowFarItPokesIn) {
   Pose corner_up = Pose::Identity();  // the diagonal of the cube along z
-  corner_up.linear() = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(1, 1, 1), Eigen::Vector3d::UnitZ()).matrix();
+  corner_up.linear() = turn_of_z_to<double>(Eigen::Vector3d(1, 1, 1).normalized()).inverse().matrix();
   const double reach = 0.01 * std::numbers::sqrt3;
   corner_up.translation().z() = -0.01 - reach + 0.0004;
   EXPECT_NEAR(deepest_penetration(small_cube(), {at(0, 0, 0), corner_up}), 0.0004, 1e-6);

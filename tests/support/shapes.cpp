@@ -65,6 +65,8 @@ Mesh hexagon() {
   return extrude(outline, 0.012F);
 }
 
+Mesh marked_hexagon() { return joined(hexagon(), shifted(box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F})); }
+
 Mesh stepped_shaft() {
   const Eigen::Vector2f profile[] = {{0, -0.045F},      {0.016F, -0.045F}, {0.016F, -0.005F},
                                      {0.009F, -0.005F}, {0.009F, 0.045F},  {0, 0.045F}};

@@ -27,6 +27,9 @@ Mesh l_block();
 /// A hexagon of 24 mm a side, 12 mm thick: 12 turns map it onto itself.
 Mesh hexagon();
 
+/// The hexagon with a small block on one face, which makes its turns unequal.
+Mesh marked_hexagon();
+
 /// A shaft of 90 mm with a thin and a thick end: symmetric about z.
 Mesh stepped_shaft();
 

@@ -10,19 +10,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A hexagon that a small block on one face makes unequal to its turns.
-Mesh marked_hexagon() {
-  return testing::joined(testing::hexagon(),
-                         testing::shifted(testing::box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F}));
-}
-
 struct MarkedScan {
-  Model model = testing::quick_model(marked_hexagon());
+  Model model = testing::quick_model(testing::marked_hexagon());
   Pose T_scene_model;
   DepthMap map;
 
   explicit MarkedScan(const Pose& pose) : T_scene_model(pose) {
-    map = testing::scan_map({{{marked_hexagon(), pose}}}, {}, model.diameter);
+    map = testing::scan_map({{{testing::marked_hexagon(), pose}}}, {}, model.diameter);
   }
   VariantChoice choose(const Pose& T) const {
     VerifyOptions options;

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr float kGate = 0.015F;  // diameters
-constexpr float kTolerance = 0.0005F;
+constexpr float kOnSurface = 0.0005F;
 
 /// The block, and a cloud of all its sides.
 struct AllSides {
@@ -107,15 +107,15 @@ TEST(WholeSurface, LeavesAPoseWhereThereIsNothing) {
   const AllSides& sides = all_sides();
   const Eigen::Isometry3f nowhere = sides.in_view(beside_truth(0, {0.5, 0, 0}));
   EXPECT_TRUE(sides.surface.refine(sides.cloud, nowhere, kGate).isApprox(nowhere));
-  EXPECT_TRUE(sides.surface.explained(sides.cloud, nowhere, kTolerance).empty());
+  EXPECT_TRUE(sides.surface.explained(sides.cloud, nowhere, kOnSurface).empty());
 }
 
 TEST(WholeSurface, ExplainsNextToAllPointsWhereThePartLiesAndFewerWhenItIsTurned) {
   const AllSides& sides = all_sides();
   const std::size_t all = sides.cloud.points().size();
-  EXPECT_GT(sides.surface.explained(sides.cloud, sides.in_view(sides.truth), kTolerance).size(), 0.98 * all);
+  EXPECT_GT(sides.surface.explained(sides.cloud, sides.in_view(sides.truth), kOnSurface).size(), 0.98 * all);
   const Pose turned = sides.truth * testing::pose(180, Vector3d::UnitX(), {0, 0.08, 0});  // its long side on itself
-  EXPECT_LT(sides.surface.explained(sides.cloud, sides.in_view(turned), kTolerance).size(), 0.8 * all);
+  EXPECT_LT(sides.surface.explained(sides.cloud, sides.in_view(turned), kOnSurface).size(), 0.8 * all);
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ TEST(SensorView, LeavesOutWhatWasNotMeasuredOrLiesBehindTheSensor) {
   EXPECT_EQ(view->points.size(), 3u);
 }
 
-struct Refused {
+struct RefusedCloud {
   const char* what;
   PointCloud cloud;
   const char* says;
@@ -70,7 +70,7 @@ TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
   lost_sensor.sensor_position.x() = kMissing;
   PointCloud few_normals = testing::scattered({{0, 0, 1}, {0, 0, 2}});
   few_normals.normals = {{0, 0, -1}};
-  const Refused cases[] = {
+  const RefusedCloud cases[] = {
       {"size", wrong_size, "2 points; width x height is 2 x 2 = 4"},
       {"huge size", huge_size, "1 points; width x height is"},
       {"empty", testing::scattered({}), "0 points"},
@@ -80,7 +80,7 @@ TEST(SensorView, RefusesCloudsThatContradictThemselvesOrHoldNothing) {
       {"sensor position", lost_sensor, "sensor_position"},
       {"normals", few_normals, "1 normals for 2 points"},
   };
-  for (const Refused& refused : cases) {
+  for (const RefusedCloud& refused : cases) {
     const absl::StatusOr<SensorView> view = sensor_view(refused.cloud);
     ASSERT_EQ(view.status().code(), absl::StatusCode::kInvalidArgument) << refused.what;
     EXPECT_THAT(std::string(view.status().message()), HasSubstr(refused.says)) << refused.what;

@@ -39,7 +39,7 @@ TEST(MeshExtent, IgnoresVerticesThatNoTriangleUses) {
   EXPECT_NEAR(mesh_extent(mesh).box_max.x(), 0.015, 1e-6);
 }
 
-struct Refused {
+struct RefusedMesh {
   Mesh mesh;
   const char* says;
 };
@@ -61,7 +61,7 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
   for (int i = 0; i < 200; ++i) {
     folded.triangles.insert(folded.triangles.end(), good.triangles.begin(), good.triangles.end());
   }
-  const Refused cases[] = {{empty, "0 triangles"},
+  const RefusedMesh cases[] = {{empty, "0 triangles"},
                            {bad_index, "triangle 3 refers to vertex 99; there are 8"},
                            {not_finite, "vertex 2 has a coordinate that is not a finite number"},
                            {flat, "degenerate"},
@@ -72,7 +72,7 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
                            {overflowing, "Check the unit"},
                            {folded, "doubled faces"}};
   EXPECT_TRUE(check_mesh(good).ok());
-  for (const Refused& refused : cases) {
+  for (const RefusedMesh& refused : cases) {
     const absl::Status status = check_mesh(refused.mesh);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << refused.says;
     EXPECT_THAT(std::string(status.message()), HasSubstr(refused.says));

@@ -14,12 +14,12 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr double kPixel = 0.002;
+constexpr double kPixelSize = 0.002;
 
 std::vector<std::vector<ContourPoint>> outlines_of(const Mesh& mesh, const std::vector<Vector3f>& views, int threads) {
   RunControl control;
   control.threads = threads;
-  return outlines(scatter(mesh, kPixel / 2), views, 0.14, kPixel, 0.004, control);
+  return outlines(scatter(mesh, kPixelSize / 2), views, 0.14, kPixelSize, 0.004, control);
 }
 
 TEST(Outlines, OfABoxFromAboveAreTheRimOfItsTop) {
@@ -28,14 +28,14 @@ TEST(Outlines, OfABoxFromAboveAreTheRimOfItsTop) {
     EXPECT_NEAR(c.position.z(), 0.015F, 1e-5F);
     EXPECT_TRUE(c.normal.isApprox(Vector3f(0, 0, 1), 1e-4F));
     const float to_x = 0.05F - std::abs(c.position.x()), to_y = 0.03F - std::abs(c.position.y());
-    EXPECT_LT(std::min(to_x, to_y), 2 * kPixel);
-    if (std::max(to_x, to_y) > 3 * kPixel) {
+    EXPECT_LT(std::min(to_x, to_y), 2 * kPixelSize);
+    if (std::max(to_x, to_y) > 3 * kPixelSize) {
       const Vector3f away = to_x < to_y ? Vector3f(std::copysign(1.0F, c.position.x()), 0, 0)
                                         : Vector3f(0, std::copysign(1.0F, c.position.y()), 0);
       EXPECT_GT(c.outward.dot(away), 0.9F);
     }
   }
-  EXPECT_NEAR(static_cast<double>(rim.size()), 0.32 / kPixel, 0.15 * 0.32 / kPixel);
+  EXPECT_NEAR(static_cast<double>(rim.size()), 0.32 / kPixelSize, 0.15 * 0.32 / kPixelSize);
 }
 
 TEST(Outlines, OfAStepAreInsideOfTheSilhouetteToo) {
@@ -44,7 +44,7 @@ TEST(Outlines, OfAStepAreInsideOfTheSilhouetteToo) {
   const std::vector<ContourPoint> rims = outlines_of(hat, {{0, 0, 1}}, 1)[0];
   const auto upper =
       std::count_if(rims.begin(), rims.end(), [](const ContourPoint& c) { return c.position.z() > 0.02F; });
-  EXPECT_NEAR(static_cast<double>(upper), 0.16 / kPixel, 0.2 * 0.16 / kPixel);
+  EXPECT_NEAR(static_cast<double>(upper), 0.16 / kPixelSize, 0.2 * 0.16 / kPixelSize);
   EXPECT_GT(rims.size() - static_cast<std::size_t>(upper), 150u);
 }
 

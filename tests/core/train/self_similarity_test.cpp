@@ -23,11 +23,6 @@ struct Part {
   SelfSimilarity search() const { return find_self_similarity(dense, surface, diameter, {}); }
 };
 
-Mesh marked_hexagon() {
-  return testing::joined(testing::hexagon(),
-                         testing::shifted(testing::box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F}));
-}
-
 TEST(SelfSimilarity, OfAnLIsTheIdentityAlone) {
   const SelfSimilarity found = Part(testing::l_block()).search();
   EXPECT_EQ(found.symmetry.discrete.size(), 1u);
@@ -60,7 +55,7 @@ TEST(SelfSimilarity, OfAShaftIsItsAxis) {
 }
 
 TEST(SelfSimilarity, CallsAMarkedHexagonSimilarNotSymmetric) {
-  const Part part(marked_hexagon());
+  const Part part(testing::marked_hexagon());
   const SelfSimilarity found = part.search();
   EXPECT_EQ(found.symmetry.discrete.size(), 1u);
   int sixths = 0;

@@ -12,17 +12,17 @@
 namespace binpose {
 namespace {
 
-using Triangle = std::array<std::uint32_t, 3>;
+using Corners = std::array<std::uint32_t, 3>;
 using Edge = std::array<std::uint32_t, 2>;
 
-Triangle least_first(Triangle t) {
+Corners least_first(Corners t) {
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
   return t;
 }
 
-bool is_collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+bool is_collapsed(const Corners& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-bool runs_along(const Triangle& t, const Edge& edge) {
+bool runs_along(const Corners& t, const Edge& edge) {
   for (int k = 0; k < 3; ++k) {
     if (t[k] == edge[0] && t[(k + 1) % 3] == edge[1]) return true;
   }
@@ -39,7 +39,7 @@ struct Flooded {
 
   explicit Flooded(const Mesh& mesh)
       : first(mesh.triangles.size()), turned(first.size(), false), agrees(first.size(), true) {
-    std::map<Triangle, std::uint32_t> known;
+    std::map<Corners, std::uint32_t> known;
     std::map<std::uint32_t, std::uint32_t> original;  // of a repeated triangle
     for (std::uint32_t t = 0; t < first.size(); ++t) {
       first[t] = t;
