@@ -62,15 +62,15 @@ TEST(CheckMesh, RefusesWhatNothingCanBeTrainedFrom) {
     folded.triangles.insert(folded.triangles.end(), good.triangles.begin(), good.triangles.end());
   }
   const RefusedMesh cases[] = {{empty, "0 triangles"},
-                           {bad_index, "triangle 3 refers to vertex 99; there are 8"},
-                           {not_finite, "vertex 2 has a coordinate that is not a finite number"},
-                           {flat, "degenerate"},
-                           {specks, "a stray one lies far off"},
-                           {huge, "diameter of 130000 m"},
-                           {tiny, "Check the unit"},
-                           {far, "vertex 0 has a coordinate beyond 1e+08 m"},
-                           {overflowing, "Check the unit"},
-                           {folded, "doubled faces"}};
+                               {bad_index, "triangle 3 refers to vertex 99; there are 8"},
+                               {not_finite, "vertex 2 has a coordinate that is not a finite number"},
+                               {flat, "degenerate"},
+                               {specks, "a stray one lies far off"},
+                               {huge, "diameter of 130000 m"},
+                               {tiny, "Check the unit"},
+                               {far, "vertex 0 has a coordinate beyond 1e+08 m"},
+                               {overflowing, "Check the unit"},
+                               {folded, "doubled faces"}};
   EXPECT_TRUE(check_mesh(good).ok());
   for (const RefusedMesh& refused : cases) {
     const absl::Status status = check_mesh(refused.mesh);
