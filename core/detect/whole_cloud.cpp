@@ -10,8 +10,9 @@
 namespace binpose {
 namespace {
 
-constexpr float kReach = 0.05F;    // diameters
+constexpr float kCell = 0.05F;     // diameters
 constexpr float kMostCells = 100;  // along each axis
+constexpr float kReach = 2;        // cells
 constexpr int kIterations = 8;
 constexpr std::size_t kMostPoints = 1000;  // that a pose is refined with
 constexpr int kFewestPoints = 12;
@@ -98,10 +99,10 @@ std::vector<std::uint32_t> WholeCloud::in_box(const Eigen::AlignedBox3f& box,
 WholeSurface::WholeSurface(const Model& model)
     : model_(model),
       // The second counts only where a model's box does not fit its diameter: it bounds the cells.
-      cell_(std::max(kReach * static_cast<float>(model.diameter),
+      cell_(std::max(kCell * static_cast<float>(model.diameter),
                      static_cast<float>((model.box_max - model.box_min).cwiseAbs().maxCoeff()) / kMostCells)),
-      box_(model.box_min.cast<float>() - Eigen::Vector3f::Constant(cell_),
-           model.box_max.cast<float>() + Eigen::Vector3f::Constant(cell_)) {
+      box_(model.box_min.cast<float>() - Eigen::Vector3f::Constant(reach()),
+           model.box_max.cast<float>() + Eigen::Vector3f::Constant(reach())) {
   size_ = (box_.sizes().array() / cell_).max(0.0F).cast<int>() + 1;
   first_.assign(static_cast<std::size_t>(size_.prod()) + 1, 0);
   std::vector<int> cells;
@@ -115,6 +116,8 @@ WholeSurface::WholeSurface(const Model& model)
   std::vector<int> next(first_.begin(), first_.end() - 1);
   for (std::size_t i = 0; i < cells.size(); ++i) sorted_[next[cells[i]]++] = static_cast<int>(i);
 }
+
+float WholeSurface::reach() const { return kReach * cell_; }
 
 Eigen::Array3i WholeSurface::cell_of(const Eigen::Vector3f& p_model) const {
   return ((p_model - box_.min()).array() / cell_).cast<int>().max(0).min(size_ - 1);
@@ -147,7 +150,7 @@ Eigen::Isometry3f WholeSurface::refine(const WholeCloud& cloud, const Eigen::Iso
   const std::vector<Eigen::Vector3f> points = some_of(cloud, cloud.in_box(box_, T), kMostPoints);
   const Eigen::Vector3f centre = model_.centre.cast<float>();
   for (int i = 0; i < kIterations; ++i) {
-    const float now = cell_ * std::pow(gate / cell_, static_cast<float>(i) / (kIterations - 1));
+    const float now = reach() * std::pow(gate / reach(), static_cast<float>(i) / (kIterations - 1));
     const Eigen::Isometry3f T_model_view = T.inverse();
     Step step;
     for (const Eigen::Vector3f& point : points) {
@@ -173,7 +176,7 @@ std::vector<std::uint32_t> WholeSurface::explained(const WholeCloud& cloud, cons
   std::vector<std::uint32_t> found;
   for (const std::uint32_t i : cloud.in_box(box_, T_view_model)) {
     const Eigen::Vector3f p = T_model_view * cloud.points()[i];
-    const SurfacePoint* surface = nearest(p, std::min(beside, cell_));
+    const SurfacePoint* surface = nearest(p, std::min(beside, reach()));
     if (surface != nullptr && std::abs(surface->normal.dot(p - surface->position)) <= tolerance) found.push_back(i);
   }
   return found;

@@ -48,7 +48,7 @@ class WholeSurface {
   /// The points of the cloud that lie within `tolerance` metres of the surface, along its normal; ascending indices.
   std::vector<std::uint32_t> explained(const WholeCloud& cloud, const Eigen::Isometry3f& T_view_model,
                                        float tolerance) const;
-  float reach() const { return cell_; }
+  float reach() const;
 
  private:
   Eigen::Array3i cell_of(const Eigen::Vector3f& p_model) const;
