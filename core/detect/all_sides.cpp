@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 
+#include "core/detect/judge.h"
 #include "core/detect/places.h"
 #include "core/detect/prepare.h"
 #include "core/detect/search.h"

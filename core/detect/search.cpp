@@ -6,6 +6,7 @@
 
 #include "core/detect/cluster.h"
 #include "core/detect/contour_votes.h"
+#include "core/detect/judge.h"
 #include "core/detect/places.h"
 #include "core/detect/refine.h"
 #include "core/detect/scene_points.h"
@@ -21,8 +22,6 @@ constexpr double kRelativeBlock = 0.042;
 constexpr double kFewPoints = 1500;  // the share of the start points is of so many at least
 constexpr float kClusterRadius = 0.06F;
 constexpr float kCoarseTolerance = 0.04F;
-constexpr float kFinalTolerance = 0.006F;
-constexpr float kNoiseTolerance = 2.5F;
 constexpr float kFirstGate = 0.08F;
 constexpr float kLastGate = 0.025F;
 
@@ -38,7 +37,6 @@ constexpr double kHopeful = 1.0 / 6;
 constexpr float kFinestGate = 0.015F;
 constexpr int kFinestIterations = 3;
 constexpr int kFinestPoints = 400;
-constexpr float kAlignmentCutoff = 0.1F;
 constexpr double kContourStarts = 5;          // as many contour points start pairs, by share, as surface points do
 constexpr double kVotedAngle = 25 * kDegree;  // that a pose made of votes may be off
 
@@ -198,40 +196,6 @@ std::vector<Candidate> compare_all_points(std::vector<Candidate> candidates, con
 }
 
 }  // namespace
-
-VerifyOptions final_verification(const DepthMap& map, const Model& model) {
-  VerifyOptions options;
-  options.tolerance = kFinalTolerance * static_cast<float>(model.diameter) + kNoiseTolerance * map.noise;
-  return options;
-}
-
-Evidence final_evidence(const DepthMap& map, const Model& model, const Eigen::Isometry3f& T_view_model,
-                        const DetectParams& params) {
-  if (params.verification == Verification::kVisibleSurface) {
-    return verify(map, model, T_view_model, final_verification(map, model));
-  }
-  Evidence evidence;
-  evidence.area = evidence.outline_confirmed = 1;
-  evidence.explained = alignment_score(map, model, T_view_model, kAlignmentCutoff * static_cast<float>(model.diameter));
-  return evidence;
-}
-
-void sort_by(float (Evidence::*merit)() const, std::vector<Candidate>& candidates) {
-  std::vector<std::pair<float, std::size_t>> order;  // negative: best first
-  order.reserve(candidates.size());
-  for (const Candidate& candidate : candidates) order.emplace_back(-(candidate.evidence.*merit)(), order.size());
-  std::sort(order.begin(), order.end());
-  std::vector<Candidate> sorted;
-  sorted.reserve(candidates.size());
-  for (const auto& [merit_below_0, i] : order) sorted.push_back(std::move(candidates[i]));
-  candidates = std::move(sorted);
-}
-
-bool is_allowed(const DepthMap& map, const Model& model, int model_index, const SearchSpace& space, const Slack& slack,
-                const Eigen::Isometry3f& T_view_model) {
-  return allows(space, model_index, model.symmetry, model.centre, map.T_scene_view * Pose(T_view_model.cast<double>()),
-                map.T_scene_view.translation(), slack);
-}
 
 std::vector<Candidate> search(const DepthMap& map, const Model& model, int model_index, const DetectParams& params,
                               const RunControl& control, DetectStats& stats) {

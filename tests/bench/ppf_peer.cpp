@@ -32,10 +32,10 @@
 #include <vector>
 
 #include "core/detect/detect.h"
+#include "core/detect/judge.h"
 #include "core/detect/prepare.h"
 #include "core/detect/rank.h"
 #include "core/detect/refine.h"
-#include "core/detect/search.h"
 #include "core/detect/stage_timer.h"
 #include "core/train/train.h"
 #include "tests/support/bin_scene.h"

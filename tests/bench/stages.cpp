@@ -11,6 +11,7 @@
 #include "core/detect/cluster.h"
 #include "core/detect/contour_votes.h"
 #include "core/detect/detect.h"
+#include "core/detect/judge.h"
 #include "core/detect/rank.h"
 #include "core/detect/refine.h"
 #include "core/detect/scene_points.h"

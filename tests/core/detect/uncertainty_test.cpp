@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "core/detect/judge.h"
 #include "core/detect/refine.h"
-#include "core/detect/search.h"
 #include "tests/support/scan_map.h"
 #include "tests/support/shapes.h"
 
