@@ -32,7 +32,14 @@ void add_scan_options(CLI::App& command, ScanOptions& options) {
 void add_search_options(CLI::App& command, ScanOptions& options) {
   command.add_option("--model", options.model_ids, "IDs of the parts to look for")->required()->type_name("ID...");
   add_unit(command, options.unit, "Unit of the scene's lengths (of a depth image: of the answer's)");
-  command.add_option("--camera", options.camera, "Camera file of depth images, JSON")->type_name("FILE");
+  CLI::Option* camera =
+      command.add_option("--camera", options.camera, "Camera file of depth images, JSON")->type_name("FILE");
+  command
+      .add_option("--sensor", options.sensor,
+                  "Where the scan was taken from, in its frame and unit; default: a PCD file's VIEWPOINT, else 0 0 0")
+      ->expected(3)
+      ->type_name("X Y Z")
+      ->excludes(camera);
   command.add_option("--max-results", options.max_results, "At most this many poses, best first");
   command.add_option("--min-score", options.min_score, "Leave out poses that score less, 0 to 1");
   command.add_option("--presence-score", options.presence_score,
@@ -69,6 +76,16 @@ absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const
   request.set_request_id(request_id_of(scene));
   request.mutable_model_ids()->Add(options.model_ids.begin(), options.model_ids.end());
   *request.mutable_cloud() = *std::move(cloud);
+  if (!options.sensor.empty()) {
+    if (request.cloud().has_depth()) {
+      return absl::InvalidArgumentError(scene +
+                                        " is a depth image, seen from its camera at 0 0 0; leave out --sensor.");
+    }
+    v1::Vector3& position = *request.mutable_cloud()->mutable_sensor_position();
+    position.set_x(options.sensor[0]);
+    position.set_y(options.sensor[1]);
+    position.set_z(options.sensor[2]);
+  }
   if (options.params.has_value()) {
     if (absl::Status read = read_params(*options.params, *request.mutable_params()); !read.ok()) return read;
   }

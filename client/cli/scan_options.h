@@ -16,6 +16,7 @@ struct ScanOptions {
   std::vector<std::string> model_ids;
   std::vector<std::string> scenes;
   std::optional<std::string> camera;
+  std::vector<double> sensor;  ///< x, y, z in the scene's unit; empty: what the scan says itself
   v1::LengthUnit unit = v1::LENGTH_UNIT_UNSPECIFIED;
   std::optional<std::uint32_t> max_results;
   std::optional<std::uint32_t> max_rejected;

@@ -191,7 +191,7 @@ TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
 TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   const Output output = run(
       "detect --model gear bolt --unit mm --max-results 5 --presence-score 0.2 --min-score 0 --start-point-share 0.5 "
-      "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --scene",
+      "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --sensor 10 -20 1500 --scene",
       {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
   EXPECT_EQ(server_.stream_count(), 1);
@@ -199,6 +199,9 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   ASSERT_EQ(requests.size(), 2u);
   EXPECT_EQ(requests[0].cloud().pcd(), "# a");
   EXPECT_EQ(requests[1].cloud().ply(), "ply\nb");
+  EXPECT_EQ(requests[1].cloud().sensor_position().x(), 10);
+  EXPECT_EQ(requests[1].cloud().sensor_position().y(), -20);
+  EXPECT_EQ(requests[1].cloud().sensor_position().z(), 1500);
   const v1::DetectRequest& request = requests[0];
   EXPECT_THAT(request.model_ids(), ::testing::ElementsAre("gear", "bolt"));
   EXPECT_EQ(request.params().max_results(), 5u);
@@ -209,6 +212,14 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   EXPECT_EQ(request.params().normal_tolerance_degrees(), 15);
   EXPECT_TRUE(request.params().has_remove_support_plane());
   EXPECT_FALSE(request.params().remove_support_plane());
+}
+
+TEST_F(Cli, ADepthImageIsSeenFromItsCameraAlone) {
+  const std::string detect = "detect --model gear --unit mm --sensor 0 0 1000 --scene ";
+  const Output folder = run(detect + BINPOSE_TEST_DATA "/scenes/bearing_support_01");
+  EXPECT_EQ(folder.exit_code, 3);
+  EXPECT_THAT(folder.err, AllOf(HasSubstr("bearing_support_01"), HasSubstr("leave out --sensor")));
+  EXPECT_EQ(run(detect + "depth.png --camera camera.json").exit_code, 2);
 }
 
 TEST_F(Cli, AParamsFileSaysWhatHasNoOptionAndOptionsOverrideIt) {
