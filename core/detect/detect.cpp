@@ -6,6 +6,7 @@
 #include "absl/strings/str_format.h"
 #include "core/detect/all_sides.h"
 #include "core/detect/describe.h"
+#include "core/detect/judge.h"
 #include "core/detect/prepare.h"
 #include "core/detect/rank.h"
 #include "core/detect/search.h"
@@ -32,6 +33,17 @@ std::string why_nothing_was_found(const DetectStats& stats, float best_doubtful,
   return "No pose reached min_score: the part is not there, or less of it is visible than the score asks for.";
 }
 
+/// A sentence for a cloud that surrounds its sensor, as one does that was moved without it; empty for any other.
+std::string why_the_sensor_is_doubtful(const SensorView& view) {
+  constexpr double kStray = 0.05;
+  if (view.share_behind <= kStray) return "";
+  const Eigen::Vector3d sensor = view.T_scene_view.translation();
+  return absl::StrFormat(
+      "%.0f %% of the points lie beside or behind sensor_position (%g, %g, %g) m and were left out: it must say where "
+      "the cloud was measured from.",
+      100 * view.share_behind, sensor.x(), sensor.y(), sensor.z());
+}
+
 }  // namespace
 
 absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Model* const> models,
@@ -44,6 +56,8 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   DetectResult result;
   DetectStats& stats = result.stats;
   stats.point_count = view->points.size();
+  if (std::string doubt = why_the_sensor_is_doubtful(*view); !doubt.empty())
+    result.warnings.push_back(std::move(doubt));
 
   DepthMap finest;  // where models of several sizes meet
   std::vector<Candidate> candidates;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "absl/strings/str_format.h"
 #include "core/parallel.h"
@@ -49,16 +50,20 @@ struct PointsInView {
   Eigen::Matrix3f R_view_scene;
   Eigen::Vector3f sensor;  // scene frame
 
-  /// Calls `use(i, point)` for each of a block of the cloud's points that lies in front of the sensor.
+  /// Calls `use(i, point)` for each of a block of the cloud's points that lies in front of the sensor. Returns how many
+  /// others were measured.
   template <typename Use>
-  void for_each(std::size_t block, const Use& use) const {
+  std::size_t for_each(std::size_t block, const Use& use) const {
+    std::size_t others = 0;
     const std::size_t end = std::min(cloud.points.size(), (block + 1) * kPointsPerBlock);
     for (std::size_t i = block * kPointsPerBlock; i < end; ++i) {
       const Eigen::Vector3f p = R_view_scene * (cloud.points[i] - sensor);
-      const bool seen =
-          p.allFinite() && p.z() > 1e-6F && std::max(std::abs(p.x()), std::abs(p.y())) <= kWidestTangent * p.z();
+      if (!p.allFinite()) continue;
+      const bool seen = p.z() > 1e-6F && std::max(std::abs(p.x()), std::abs(p.y())) <= kWidestTangent * p.z();
       if (seen) use(i, p);
+      others += static_cast<std::size_t>(!seen && p.squaredNorm() > 0);
     }
+    return others;
   }
   Eigen::Vector3f normal(std::size_t i) const { return R_view_scene * cloud.normals[i]; }
   int block_count() const { return static_cast<int>((cloud.points.size() + kPointsPerBlock - 1) / kPointsPerBlock); }
@@ -68,14 +73,14 @@ struct PointsInView {
 void take_points(const PointCloud& cloud, const RunControl& control, SensorView& view) {
   const PointsInView source = {cloud, view.T_scene_view.linear().transpose().cast<float>(),
                                view.T_scene_view.translation().cast<float>()};
-  std::vector<std::size_t> counts(source.block_count(), 0);
+  std::vector<std::size_t> counts(source.block_count(), 0), others(source.block_count(), 0);
   std::vector<TangentBox> windows(source.block_count());
   view.points.resize(cloud.points.size());
   view.normals.resize(cloud.normals.size());
   parallel_for(source.block_count(), control.threads, [&](int b) {
     if (control.stop.stop_requested()) return;
     const std::size_t first = b * kPointsPerBlock;
-    source.for_each(b, [&](std::size_t i, const Eigen::Vector3f& p) {
+    others[b] = source.for_each(b, [&](std::size_t i, const Eigen::Vector3f& p) {
       const std::size_t to = first + counts[b]++;
       view.points[to] = p;
       if (!cloud.normals.empty()) view.normals[to] = source.normal(i);
@@ -94,6 +99,8 @@ void take_points(const PointCloud& cloud, const RunControl& control, SensorView&
     view.window.extend(windows[b]);
     total += counts[b];
   }
+  const auto behind = static_cast<double>(std::accumulate(others.begin(), others.end(), std::size_t{0}));
+  view.share_behind = behind / std::max(1.0, behind + static_cast<double>(total));
   view.points.resize(total);
   if (!cloud.normals.empty()) view.normals.resize(total);
 }

@@ -41,6 +41,7 @@ struct SensorView {
   float median_depth = 0;                ///< metres
   float spacing = 0;                     ///< typical distance of neighbouring points across the view, metres
   bool is_grid = false;                  ///< an image's points, row by row; else scattered
+  double share_behind = 0;               ///< of the measured points: left out, as they lie beside or behind the sensor
 };
 
 /// Errors: INVALID_ARGUMENT when width x height does not fit the points, when no point is finite, or when none lies in

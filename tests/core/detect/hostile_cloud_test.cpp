@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -86,6 +87,17 @@ TEST_F(HostileCloud, WithTheSensorFarAwayOrInsideFindsNothingOrRefuses) {
     if (result.ok()) continue;
     EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument) << at.transpose();
   }
+}
+
+TEST_F(HostileCloud, AroundItsSensorIsAnsweredWithAWarningThatNamesTheSensor) {
+  PointCloud cloud = scan();
+  ASSERT_EQ(search(cloud)->hypotheses.size(), 1U);
+  EXPECT_TRUE(search(cloud)->warnings.empty());
+  cloud.sensor_position = Eigen::Vector3d(0.05, 0, 0.49);  // beside the part, next to the ground
+  const absl::StatusOr<DetectResult> result = search(cloud);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_FALSE(result->warnings.empty());
+  EXPECT_THAT(result->warnings[0], ::testing::HasSubstr("beside or behind sensor_position (0.05, 0, 0.49) m"));
 }
 
 TEST_F(HostileCloud, OfOnePointOrOneLineOrOnePlaceHoldsNothing) {

@@ -53,6 +53,7 @@ TEST(SensorView, LeavesOutWhatWasNotMeasuredOrLiesBehindTheSensor) {
       {{0, 0, 0.5F}, {kMissing, 0, 0.5F}, {0, 0, INFINITY}, {0, 0, -0.5F}, {0.01F, 0, 0.5F}, {0, 0.01F, 0.6F}}));
   ASSERT_TRUE(view.ok());
   EXPECT_EQ(view->points.size(), 3u);
+  EXPECT_EQ(view->share_behind, 0.25);
 }
 
 struct RefusedCloud {
