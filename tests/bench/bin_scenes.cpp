@@ -124,6 +124,25 @@ bool search_for_wrong_parts(const BinScene& scene, const Trained& trained, const
   return true;
 }
 
+/// What can be left out to see what it brings, by name.
+using Step = void (*)(TrainParams&, DetectParams&);
+const std::map<std::string, Step>& steps() {
+  static const std::map<std::string, Step> all = {
+      {"contours", [](TrainParams&, DetectParams& detect) { detect.use_contours = false; }},
+      {"normal-gate", [](TrainParams&, DetectParams& detect) { detect.normal_tolerance = 180 * kDegree; }},
+      {"plane-removal", [](TrainParams&, DetectParams& detect) { detect.remove_support_plane = false; }},
+      {"promise", [](TrainParams&, DetectParams& detect) { detect.least_promise = -2; }},
+      {"places", [](TrainParams&, DetectParams& detect) { detect.clusters_per_place = detect.cluster_limit; }},
+      {"refinement", [](TrainParams&, DetectParams& detect) { detect.refine = false; }},
+      {"presence", [](TrainParams&, DetectParams& detect) { detect.presence_score = 0; }},
+      {"signal-to-noise", [](TrainParams& train, DetectParams&) { train.selection = PairSelection::kIntegration; }},
+      {"second-lengths", [](TrainParams& train, DetectParams&) { train.pair_lengths.resize(1); }},
+      {"pairs",
+       [](TrainParams& train, DetectParams&) { train.pairs_per_point = TrainParams::paper().pairs_per_point; }},
+  };
+  return all;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {  // NOLINT(readability-function-size): one line an option
@@ -165,6 +184,8 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   app.add_option("--point-share", point_share, "share of the points that is kept, at random");
   std::optional<int> cluster_limit;
   app.add_option("--clusters", cluster_limit, "clusters of votes that are looked at, per source");
+  std::vector<std::string> left_out;
+  app.add_option("--without", left_out, "steps of the method that are left out")->check(CLI::IsMember(&steps()));
   CLI11_PARSE(app, argc, argv);
   if (paper->count() > 0) {
     train_params = TrainParams::paper();
@@ -173,6 +194,7 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   }
   if (effort == "fast") detect_params = DetectParams::fast();
   if (effort == "thorough") detect_params = DetectParams::thorough();
+  for (const std::string& step : left_out) steps().at(step)(train_params, detect_params);
   if (min_score) detect_params.min_score = *min_score;
   if (presence_score) detect_params.presence_score = *presence_score;
   if (share) detect_params.start_point_share = *share;
