@@ -42,8 +42,7 @@ for preset in "$@"; do
       cmake --build build/tsan --target core_test server_parts_test
       export TSAN_OPTIONS=halt_on_error=1
       # By their names; the others work on one thread, where nothing can race.
-      GTEST_FILTER="*Threads*:*Cancel*:*Stopped*:*Deadline*" run_tests tsan core_test ||
-        failed=yes
+      GTEST_FILTER="*Threads*:*Cancel*:*Stopped*:*Deadline*" run_tests tsan core_test || failed=yes
       GTEST_FILTER="ComputePool*:HangGuard*:ModelStore*" run_tests tsan server_parts_test || failed=yes
       ;;
   esac
