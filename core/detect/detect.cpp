@@ -56,8 +56,8 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   DetectResult result;
   DetectStats& stats = result.stats;
   stats.point_count = view->points.size();
-  if (std::string doubt = why_the_sensor_is_doubtful(*view); !doubt.empty())
-    result.warnings.push_back(std::move(doubt));
+  const std::string doubt = why_the_sensor_is_doubtful(*view);
+  if (!doubt.empty()) result.warnings.push_back(doubt);
 
   DepthMap finest;  // where models of several sizes meet
   std::vector<Candidate> candidates;
