@@ -19,7 +19,6 @@ constexpr float kRotationCell = 0.2F;
 constexpr int kRotationCells = 8;  // cover [-0.8, 0.8]
 
 constexpr std::size_t kVotesPerTask = 4096;
-constexpr std::size_t kCellsPerTask = 1024;
 constexpr std::size_t kSeedsPerTask = 64;
 
 /// Numbers of a pose cell: centre x, y, z, the quaternion's largest component, and the bins of its other three.
@@ -194,10 +193,9 @@ class PoseCellIndex {
 };
 
 /// A cell with those of the 64 cells around its mean (8 of centre, 8 of rotation) that agree with it.
-PoseCluster with_neighbours(const std::vector<Cell>& cells, const std::vector<PoseCluster>& means,
-                            const PoseCellIndex& index, std::uint32_t seed, const CellOf& cell_of,
-                            const SamePose& same_pose) {
-  const PoseCluster& own = means[seed];
+PoseCluster with_neighbours(const std::vector<Cell>& cells, const PoseCellIndex& index, std::uint32_t seed,
+                            const CellOf& cell_of, const SamePose& same_pose) {
+  const PoseCluster own = mean(cells[seed]);
   const RotationCoordinates rotation(own.q_view_model);
   const Eigen::Array3i low_cell = (cell_of.centre_coordinates(own.centre) - 0.5F).cast<int>();
   const std::uint64_t low_rotation = CellOf::rotation_key(rotation.largest, (rotation.rest - 0.5F).cast<int>());
@@ -206,7 +204,7 @@ PoseCluster with_neighbours(const std::vector<Cell>& cells, const std::vector<Po
     const Eigen::Array3i cell = low_cell + Eigen::Array3i(i & 1, i >> 1 & 1, i >> 2 & 1);
     index.for_each_near(cell_of.centre_key(cell), low_rotation, [&](std::uint32_t found) {
       if (found == seed) return;
-      const PoseCluster& other = means[found];
+      const PoseCluster other = mean(cells[found]);
       if (!same_pose(own, other)) return;
       add(sum, other.votes, other.centre, other.q_view_model.coeffs());
     });
@@ -226,11 +224,9 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   const std::vector<std::uint32_t> seeds = heaviest(cells, 2 * static_cast<std::size_t>(options.most));
   const PoseCellIndex index(cells);
   const SamePose same_pose(options);
-  std::vector<PoseCluster> means(cells.size());  // most are asked for several times
-  parallel_for_blocks(cells.size(), kCellsPerTask, control.threads, [&](std::size_t i) { means[i] = mean(cells[i]); });
   std::vector<PoseCluster> merged(seeds.size());
   parallel_for_blocks(seeds.size(), kSeedsPerTask, control.threads, [&](std::size_t i) {
-    if (!control.stop.stop_requested()) merged[i] = with_neighbours(cells, means, index, seeds[i], cell_of, same_pose);
+    if (!control.stop.stop_requested()) merged[i] = with_neighbours(cells, index, seeds[i], cell_of, same_pose);
   });
   if (control.stop.stop_requested()) return {};
   std::stable_sort(merged.begin(), merged.end(),
