@@ -13,6 +13,19 @@ bool same_turn(const Candidate& a, const Candidate& b, const Symmetry& symmetry)
 
 }  // namespace
 
+bool same_pose(const Model& model, const Eigen::Isometry3f& a, const Eigen::Isometry3f& b) {
+  const Pose A(a.cast<double>());
+  const Pose B = best_equivalent(Pose(b.cast<double>()), model.symmetry, A.linear().transpose());
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d p = model.box_min;
+    for (int k = 0; k < 3; ++k) {
+      if ((corner >> k & 1) != 0) p[k] = model.box_max[k];
+    }
+    if ((A * p - B * p).norm() > kSamePose * model.diameter) return false;
+  }
+  return true;
+}
+
 std::vector<Candidate> first_of_each_place(const std::vector<Candidate>& candidates, const Model& model, int per_place,
                                            int most, float repeat) {
   const Eigen::Vector3f centre = model.centre.cast<float>();

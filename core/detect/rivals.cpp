@@ -4,12 +4,11 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/detect/places.h"
 #include "core/detect/telling.h"
 
 namespace binpose {
 namespace {
-
-constexpr double kSamePose = 0.1;  // diameters; poses that move no corner of the box farther apart are one
 
 /// What the scan says to a visible point of a pose.
 struct Claim {
@@ -108,20 +107,6 @@ Comparison compare(std::span<const Claim> claims, const ClaimMap& other) {
     }
   }
   return sum;
-}
-
-/// Whether two poses show the same, near enough.
-bool same_pose(const Model& model, const Eigen::Isometry3f& a, const Eigen::Isometry3f& b) {
-  const Pose A(a.cast<double>());
-  const Pose B = best_equivalent(Pose(b.cast<double>()), model.symmetry, A.linear().transpose());
-  for (int corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d p = model.box_min;
-    for (int k = 0; k < 3; ++k) {
-      if ((corner >> k & 1) != 0) p[k] = model.box_max[k];
-    }
-    if ((A * p - B * p).norm() > kSamePose * model.diameter) return false;
-  }
-  return true;
 }
 
 /// Of `others` those in the same place, without the pose itself, its similar ones and doubles.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "core/detect/places.h"
 #include "core/detect/telling.h"
 
 namespace binpose {
@@ -39,17 +40,19 @@ VariantChoice choose_variant(const DepthMap& map, const Model& model, const Eige
   evidence.reserve(poses.size());
   for (const Eigen::Isometry3f& pose : poses) evidence.push_back(telling_evidence(map, model, pose, options));
   const auto best = std::max_element(evidence.begin(), evidence.end());
+  choice.T_view_model = poses[best - evidence.begin()];
   const float spacing = static_cast<float>(model.telling_spacing) / map.pixel_size;
-  float odds = 0;
+  float right = 0, odds = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const float likelihood = likelihood_ratio(evidence[i] - *best, spacing);
     odds += likelihood;
-    if (evidence.begin() + static_cast<std::ptrdiff_t>(i) != best && likelihood > kRuledOut) {
+    if (likelihood > kRuledOut && !same_pose(model, poses[i], choice.T_view_model)) {
       choice.rivals.push_back(poses[i]);
+    } else if (likelihood > kRuledOut) {
+      right += likelihood;
     }
   }
-  choice.T_view_model = poses[best - evidence.begin()];
-  choice.confidence = 1 / odds;
+  choice.confidence = right / odds;
   return choice;
 }
 

@@ -15,7 +15,8 @@ struct VariantChoice {
 };
 
 /// Compares a pose with the poses that show nearly the same surface (Model::similar_poses), on the points where these
-/// differ. Points that something hides or that were not measured say nothing.
+/// differ. Points that something hides or that were not measured say nothing. Variants near to the chosen one (see
+/// same_pose()) speak for it.
 ///
 /// @param options  as for the final verification.
 /// @param allowed  whether a variant's pose may be; the pose itself may.

@@ -67,6 +67,11 @@ Mesh hexagon() {
 
 Mesh marked_hexagon() { return joined(hexagon(), shifted(box({0.01F, 0.01F, 0.004F}), {0.012F, 0, 0.008F})); }
 
+Mesh pinned_disc() {
+  const Eigen::Vector2f profile[] = {{0, -0.005F}, {0.03F, -0.005F}, {0.03F, 0.005F}, {0, 0.005F}};
+  return joined(revolve(profile, 96), shifted(box({0.01F, 0.008F, 0.006F}), {0.02F, 0, 0.008F}));
+}
+
 Mesh stepped_shaft() {
   const Eigen::Vector2f profile[] = {{0, -0.045F},      {0.016F, -0.045F}, {0.016F, -0.005F},
                                      {0.009F, -0.005F}, {0.009F, 0.045F},  {0, 0.045F}};

@@ -30,6 +30,9 @@ Mesh hexagon();
 /// The hexagon with a small block on one face, which makes its turns unequal.
 Mesh marked_hexagon();
 
+/// A disc of 60 mm, 10 mm thick, with a small block on one face: nearly a body of revolution about z.
+Mesh pinned_disc();
+
 /// A shaft of 90 mm with a thin and a thick end: symmetric about z.
 Mesh stepped_shaft();
 

@@ -10,14 +10,13 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// A part alone.
 struct MarkedScan {
-  Model model = testing::quick_model(testing::marked_hexagon());
-  Pose T_scene_model;
+  Model model;
   DepthMap map;
 
-  explicit MarkedScan(const Pose& pose) : T_scene_model(pose) {
-    map = testing::scan_map({{{testing::marked_hexagon(), pose}}}, {}, model.diameter);
-  }
+  explicit MarkedScan(const Pose& T_scene_model, const Mesh& part = testing::marked_hexagon())
+      : model(testing::quick_model(part)), map(testing::scan_map({{{part, T_scene_model}}}, {}, model.diameter)) {}
   VariantChoice choose(const Pose& T) const {
     VerifyOptions options;
     options.tolerance = static_cast<float>(0.012 * model.diameter);
@@ -49,6 +48,25 @@ TEST(Variants, AreRivalsWhenTheMarkIsHidden) {
   const VariantChoice choice = scan.choose(kMarkHidden);
   EXPECT_GE(choice.rivals.size(), 5u);
   EXPECT_LT(choice.confidence, 0.5F);
+}
+
+TEST(Variants, OfAPinnedDiscAreToldByThePinFromAnyTurn) {
+  const MarkedScan scan(kMarkSeen, testing::pinned_disc());
+  for (const double degrees : {8.0, 100.0, 203.0}) {
+    const VariantChoice choice = scan.choose(turned(kMarkSeen, degrees));
+    const Pose chosen(choice.T_view_model.cast<double>());
+    const Pose truth(testing::in_view(scan.map, kMarkSeen).cast<double>());
+    EXPECT_LT(rotation_distance(chosen, truth), 7 * kDegree) << degrees;
+    EXPECT_GT(choice.confidence, 0.9F) << degrees;  // the turns beside it are the same pose
+    EXPECT_TRUE(choice.rivals.empty()) << degrees;
+  }
+}
+
+TEST(Variants, OfAPinnedDiscAreAllTheOthersWhenThePinIsHidden) {
+  const MarkedScan scan(kMarkHidden, testing::pinned_disc());
+  const VariantChoice choice = scan.choose(kMarkHidden);
+  EXPECT_GE(choice.rivals.size(), 25u);
+  EXPECT_LT(choice.confidence, 0.2F);
 }
 
 TEST(Variants, OfAPartWithoutLikesIsThePoseItself) {

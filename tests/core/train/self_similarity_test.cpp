@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/train/mesh_extent.h"
 #include "core/train/sample_surface.h"
@@ -67,6 +69,49 @@ TEST(SelfSimilarity, CallsAMarkedHexagonSimilarNotSymmetric) {
   const std::vector<SurfacePoint> telling = telling_points(part.dense, found.similar, part.diameter);
   EXPECT_FALSE(telling.empty());
   EXPECT_LT(telling.size(), part.dense.size());
+}
+
+/// Angles of the turns about z that keep its direction, degrees in [0, 360), ascending.
+std::vector<double> angles_about_z(const std::vector<Pose>& turns) {
+  std::vector<double> angles;
+  for (const Pose& T : turns) {
+    if (T.linear()(2, 2) < 0.99) continue;
+    const double angle = std::atan2(T.linear()(1, 0), T.linear()(0, 0)) / kDegree;
+    angles.push_back(angle < 0 ? angle + 360 : angle);
+  }
+  std::sort(angles.begin(), angles.end());
+  return angles;
+}
+
+TEST(SelfSimilarity, OfAPinnedDiscGoesAllRoundInEvenSteps) {
+  const SelfSimilarity found = Part(testing::pinned_disc()).search();
+  EXPECT_FALSE(found.symmetry.has_axis);
+  EXPECT_EQ(found.symmetry.discrete.size(), 1u);
+  const std::vector<double> angles = angles_about_z(found.similar);
+  ASSERT_EQ(angles.size(), 31u);
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    EXPECT_NEAR(angles[i], 360.0 / 32 * static_cast<double>(i + 1), 1) << i;
+  }
+}
+
+/// A wheel of 18 teeth, one of which is marked.
+Mesh marked_gear() {
+  constexpr int kTeeth = 18;
+  std::vector<Eigen::Vector2f> outline;
+  for (int i = 0; i < 2 * kTeeth; ++i) {
+    const float angle = static_cast<float>(360 * kDegree * i / (2 * kTeeth));
+    outline.emplace_back((i % 2 == 0 ? 0.03F : 0.025F) * Eigen::Vector2f(std::cos(angle), std::sin(angle)));
+  }
+  return testing::joined(testing::extrude(outline, 0.02F),
+                         testing::shifted(testing::box({0.006F, 0.006F, 0.004F}), {0.015F, 0, 0.012F}));
+}
+
+TEST(SelfSimilarity, OfAMarkedGearIsFromToothToTooth) {
+  const SelfSimilarity found = Part(marked_gear()).search();
+  EXPECT_FALSE(found.symmetry.has_axis);
+  const std::vector<double> angles = angles_about_z(found.similar);
+  EXPECT_GE(angles.size(), 12u);
+  for (const double angle : angles) EXPECT_NEAR(std::remainder(angle, 20), 0, 2) << angle;
 }
 
 /// A round head with a hexagon so small that turns by up to 20 degrees leave it on itself to within the tolerance.
