@@ -21,7 +21,7 @@ constexpr float kOutlinePenalty = 1.3F;
 constexpr float kRelativeFloor = 0.002F;
 /// What is known of an outline before it is looked at, as if so large a share of it had been found right or wrong: it
 /// may all be hidden.
-constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.04F;
+constexpr float kOutlineTrust = 0.01F, kOutlineDoubt = 0.08F;
 /// Pixels up to which outlines are judged in full, diameters.
 constexpr float kFinePixel = 0.021F;
 /// How far outside of the outline the surface must have ended, and how far inside it must still be there, pixels.

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "core/geometry/contours.h"
+#include "core/geometry/hidden_surfaces.h"
 #include "core/geometry/normals.h"
 #include "core/parallel.h"
 
@@ -47,6 +48,7 @@ std::vector<std::vector<ContourPoint>> outlines(std::span<const SurfacePoint> de
                                                      : Eigen::Vector3f::Zero());
     }
     DepthMap map = depth_map(view, pixel, control);
+    hide_behind_gaps(map);  // between the points
     find_contours(map, static_cast<float>(step), Unmeasured::kFar);
     views[k] = std::move(map.contours);
     const Eigen::Isometry3f T_model_view = T_view_model.inverse();

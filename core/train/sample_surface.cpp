@@ -1,6 +1,8 @@
 #include "core/train/sample_surface.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -24,34 +26,67 @@ std::vector<std::uint32_t> scrambled_order(std::uint32_t count) {
   return order;
 }
 
+using Triangle = std::array<Eigen::Vector3f, 3>;
+
+/// The area, along the normal.
+Eigen::Vector3d area_vector(const Triangle& t) { return 0.5 * (t[1] - t[0]).cross(t[2] - t[0]).cast<double>(); }
+
+double area_of(const Triangle& t) { return area_vector(t).norm(); }
+
+/// The two parts of a triangle that is cut across its longest side.
+std::array<Triangle, 2> halves(const Triangle& t) {
+  const auto sq_length = [&](int side) { return (t[side] - t[(side + 1) % 3]).squaredNorm(); };
+  int longest = 0;
+  for (int side = 1; side < 3; ++side) {
+    if (sq_length(side) > sq_length(longest)) longest = side;
+  }
+  const Eigen::Vector3f &from = t[longest], &to = t[(longest + 1) % 3], &opposite = t[(longest + 2) % 3];
+  const Eigen::Vector3f middle = (from + to) / 2;
+  return {Triangle{from, middle, opposite}, Triangle{middle, to, opposite}};
+}
+
+/// A point of a triangle, by the R2 sequence that covers the unit square evenly; folding the square gives the triangle.
+Eigen::Vector3f point_in(const Triangle& t, std::size_t serial) {
+  double along = std::fmod(0.5 + static_cast<double>(serial) * 0.7548776662466927, 1.0);
+  double across = std::fmod(0.5 + static_cast<double>(serial) * 0.5698402909980532, 1.0);
+  if (along + across > 1) {
+    along = 1 - along;
+    across = 1 - across;
+  }
+  return t[0] + static_cast<float>(along) * (t[1] - t[0]) + static_cast<float>(across) * (t[2] - t[0]);
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control,
                                   std::vector<std::uint32_t>* triangle_of) {
   std::vector<SurfacePoint> points;
   double owed = 0.5;  // area not yet turned into points, in units of one point
-  std::uint64_t serial = 0;
+  std::uint64_t piece_count = 0;
+  std::vector<Triangle> pieces;
   for (std::uint32_t index = 0; index < mesh.triangles.size(); ++index) {
-    const auto& triangle = mesh.triangles[index];
-    const Eigen::Vector3f& a = mesh.vertices[triangle[0]];
-    const Eigen::Vector3f ab = mesh.vertices[triangle[1]] - a;
-    const Eigen::Vector3f ac = mesh.vertices[triangle[2]] - a;
-    const Eigen::Vector3f cross = ab.cross(ac);
-    const double double_area = cross.cast<double>().norm();
-    if (!(double_area > 0)) continue;
-    owed += 0.5 * double_area / (spacing * spacing);
-    const Eigen::Vector3f normal = (cross.cast<double>() / double_area).cast<float>();
-    for (; owed >= 1; owed -= 1, ++serial) {
-      if (control.interrupted_at(serial)) return points;
-      // The R2 sequence covers the unit square evenly; folding the square gives the triangle.
-      double s = std::fmod(0.5 + serial * 0.7548776662466927, 1.0);
-      double t = std::fmod(0.5 + serial * 0.5698402909980532, 1.0);
-      if (s + t > 1) {
-        s = 1 - s;
-        t = 1 - t;
+    const auto& [a, b, c] = mesh.triangles[index];
+    pieces = {{mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}};
+    const Eigen::Vector3d area = area_vector(pieces.front());
+    if (!(area.norm() > 0)) continue;
+    const Eigen::Vector3f normal = area.normalized().cast<float>();
+    // Piece by piece: a sliver as a whole would bunch its points along itself and leave gaps.
+    while (!pieces.empty()) {
+      if (control.interrupted_at(piece_count++)) return points;
+      const Triangle piece = pieces.back();
+      pieces.pop_back();
+      const auto [first, second] = halves(piece);
+      const double size = area_of(piece);
+      const bool can_be_cut = std::max(area_of(first), area_of(second)) < size;  // coordinates have few digits
+      if (size > spacing * spacing && can_be_cut) {
+        pieces.push_back(second);
+        pieces.push_back(first);
+        continue;
       }
-      points.push_back({a + static_cast<float>(s) * ab + static_cast<float>(t) * ac, normal});
-      if (triangle_of) triangle_of->push_back(index);
+      for (owed += size / (spacing * spacing); owed >= 1; owed -= 1) {
+        points.push_back({point_in(piece, points.size()), normal});
+        if (triangle_of) triangle_of->push_back(index);
+      }
     }
   }
   return points;

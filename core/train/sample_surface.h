@@ -10,7 +10,8 @@
 namespace binpose {
 
 /// Points spread over the surface in proportion to area, about one per `spacing` squared, each with the outward normal
-/// of its triangle. Triangles without area get none. Part of them when `control` interrupts.
+/// of its triangle, evenly also where triangles are long slivers. Triangles without area get none. Part of them when
+/// `control` interrupts.
 ///
 /// @param triangle_of  if given: is filled with the triangle of each point.
 std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control = {},

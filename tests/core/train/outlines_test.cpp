@@ -48,6 +48,14 @@ TEST(Outlines, OfAStepAreInsideOfTheSilhouetteToo) {
   EXPECT_GT(rims.size() - static_cast<std::size_t>(upper), 150u);
 }
 
+TEST(Outlines, ShowNothingOfTheBackThroughGapsBetweenPoints) {
+  const std::vector<SurfacePoint> dense = scatter(testing::pinned_disc(), 0.75 * kPixelSize);  // some pixels stay empty
+  const std::vector<Vector3f> below = {{0, 0, -1}};                                            // the plain side
+  const std::vector<ContourPoint> rim = outlines(dense, below, 0.06, kPixelSize, 0.004, {})[0];
+  EXPECT_GT(rim.size(), 60U);
+  for (const ContourPoint& c : rim) EXPECT_GT(c.position.head<2>().norm(), 0.03 - 3 * kPixelSize);
+}
+
 TEST(Outlines, LieOnTheSideThatTheViewerSees) {
   const std::vector<Vector3f> views = view_directions(40);
   const auto of_views = outlines_of(testing::l_block(), views, 1);

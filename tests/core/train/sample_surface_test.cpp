@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "tests/support/shapes.h"
 
@@ -78,6 +79,42 @@ TEST(Scatter, FillsEachTriangleEvenly) {
     }
   }
   for (const int count : {corner[0], corner[1], corner[2], middle}) EXPECT_NEAR(count, 1250, 25);
+}
+
+TEST(Scatter, LeavesNoGapsInAFanOfSlivers) {
+  constexpr double kSpacing = 0.0004;
+  constexpr float kRadius = 0.03F;
+  constexpr int kSlivers = 120;
+  Mesh fan;
+  fan.vertices.emplace_back(0, 0, 0);
+  for (int i = 0; i < kSlivers; ++i) {
+    const float angle = static_cast<float>(2 * std::numbers::pi * i / kSlivers);
+    fan.vertices.emplace_back(kRadius * std::cos(angle), kRadius * std::sin(angle), 0);
+    fan.triangles.push_back({0, 1U + i, 1U + (i + 1) % kSlivers});
+  }
+  constexpr int kCells = 70;  // of three spacings, over the disc's box and beyond
+  std::vector<int> count(kCells * kCells);
+  const auto cell_of = [](float x) { return static_cast<int>(std::floor(x / (3 * kSpacing))) + kCells / 2; };
+  for (const SurfacePoint& p : scatter(fan, kSpacing)) {
+    ++count[cell_of(p.position.y()) * kCells + cell_of(p.position.x())];
+  }
+  for (int row = 0; row < kCells; ++row) {
+    for (int column = 0; column < kCells; ++column) {
+      const Eigen::Vector2f middle(column - kCells / 2 + 0.5F, row - kCells / 2 + 0.5F);
+      if (static_cast<float>(3 * kSpacing) * (middle.norm() + 1) > kRadius) continue;  // not wholly inside
+      EXPECT_GE(count[row * kCells + column], 3) << middle.transpose();
+      EXPECT_LE(count[row * kCells + column], 17) << middle.transpose();
+    }
+  }
+}
+
+TEST(Scatter, EndsWhereCoordinatesAreTooCoarseToCutATriangle) {
+  Mesh far;  // 8 is the step of single precision there
+  far.vertices = {{1e8F, 0, 0}, {1e8F + 16, 0, 0}, {1e8F, 1, 0}};
+  far.triangles = {{0, 1, 2}};
+  const std::size_t count = scatter(far, 0.1).size();
+  EXPECT_GE(count, 1U);
+  EXPECT_LE(count, 801U);
 }
 
 TEST(Scatter, OfManySmallTrianglesKeepsTheDensity) {
