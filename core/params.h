@@ -63,6 +63,9 @@ struct DetectParams {
   /// holds a part nearly always shows one of them well; where all poses are doubtful, the part is not there, and where
   /// none reaches a tenth more, only those count that reach it themselves.
   double presence_score = 0.45;
+  /// Whether a pose counts, and is scored, by how surely the part is there in it or in one of its variants. If not, a
+  /// score is the less the more of those the scene leaves: few of a bin of discs reach min_score whose mark is hidden.
+  bool accept_ambiguous = false;
   int max_results = 100;  ///< [1, 1000]
   int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]
   /// Share of the down-sampled points (of 1500 where there are fewer) that pairs start from, [0.001, 1]; five times the

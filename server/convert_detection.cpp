@@ -111,6 +111,7 @@ absl::StatusOr<DetectParams> to_detect_params(const v1::DetectParams& message,
   if (message.has_normal_tolerance_degrees()) params.normal_tolerance = message.normal_tolerance_degrees() * kDegree;
   if (message.has_remove_support_plane()) params.remove_support_plane = message.remove_support_plane();
   params.list_equivalents = message.list_equivalents();
+  params.accept_ambiguous = message.accept_ambiguous();
   if (message.has_reference_orientation()) {
     const auto reference = to_rotation("reference_orientation", message.reference_orientation());
     if (!reference.ok()) return reference.status();

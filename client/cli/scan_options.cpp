@@ -44,6 +44,8 @@ void add_search_options(CLI::App& command, ScanOptions& options) {
   command.add_option("--min-score", options.min_score, "Leave out poses that score less, 0 to 1");
   command.add_option("--presence-score", options.presence_score,
                      "Answer none of a part of which no pose has a score x explained area as high, 0 to 1");
+  command.add_flag("--accept-ambiguous", options.accept_ambiguous,
+                   "Answer parts as well that may lie in one of several nearly alike poses");
   command.add_option("--max-rejected", options.max_rejected,
                      "Answer so many of those apart, in `rejected` of --json; --view asks for some by itself");
   command.add_option("--start-point-share", options.start_point_share,
@@ -99,6 +101,7 @@ absl::StatusOr<v1::DetectRequest> make_request(const ScanOptions& options, const
   if (options.normal_tolerance_degrees.has_value()) {
     params.set_normal_tolerance_degrees(*options.normal_tolerance_degrees);
   }
+  if (options.accept_ambiguous) params.set_accept_ambiguous(true);
   if (options.keep_support_plane) params.set_remove_support_plane(false);
   if (options.time_budget.has_value()) request.set_time_budget_seconds(*options.time_budget);
   return request;

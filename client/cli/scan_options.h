@@ -19,6 +19,7 @@ struct ScanOptions {
   std::vector<double> sensor;  ///< x, y, z in the scene's unit; empty: what the scan says itself
   v1::LengthUnit unit = v1::LENGTH_UNIT_UNSPECIFIED;
   std::optional<std::uint32_t> max_results;
+  bool accept_ambiguous = false;
   std::optional<std::uint32_t> max_rejected;
   std::optional<double> min_score;
   std::optional<double> presence_score;

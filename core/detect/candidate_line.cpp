@@ -27,6 +27,7 @@ CandidateLine::CandidateLine(const DepthMap& map, std::span<const Model* const> 
       rivalries_(first_.size()),
       pixels_(first_.size()),
       least_presence_(models.size(), -INFINITY) {
+  for (Candidate& candidate : first_) candidate.accept_rivals = options.accept_ambiguous;
   std::stable_sort(first_.begin(), first_.end(),
                    [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
   if (control.threads > 1) look_ahead();
@@ -49,6 +50,17 @@ std::vector<Candidate> CandidateLine::accept(double min_score, std::size_t limit
     accepted.push_back(candidates_[i]);
   }
   return accepted;
+}
+
+bool CandidateLine::is_held_back_by_rivals(double min_score) const {
+  return std::any_of(order_.begin() + static_cast<std::ptrdiff_t>(next_), order_.end(),
+                     [&](int i) { return candidates_[i].evidence.score() >= min_score; });
+}
+
+void CandidateLine::accept_rivals() {
+  for (Candidate& candidate : candidates_) candidate.accept_rivals = true;
+  std::stable_sort(order_.begin() + static_cast<std::ptrdiff_t>(next_), order_.end(),
+                   [&](int a, int b) { return candidates_[a].score() > candidates_[b].score(); });
 }
 
 bool CandidateLine::ask_of_each(int model_index, float presence) {

@@ -21,6 +21,12 @@ class CandidateLine {
   /// The next that score at least `min_score`, at most `limit` of them. Those that prove too little are passed over.
   std::vector<Candidate> accept(double min_score, std::size_t limit);
 
+  /// Whether one of those in line would score at least `min_score` if rivals did not matter.
+  bool is_held_back_by_rivals(double min_score) const;
+
+  /// From now on rivals do not matter.
+  void accept_rivals();
+
   /// Asks for at least this presence() of each of a model's poses. Returns whether that is more than before.
   bool ask_of_each(int model_index, float presence);
 

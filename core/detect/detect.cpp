@@ -33,6 +33,14 @@ std::string why_nothing_was_found(const DetectStats& stats, float best_doubtful,
   return "No pose reached min_score: the part is not there, or less of it is visible than the score asks for.";
 }
 
+/// A sentence for parts that were left out for what the scan does not tell.
+std::string what_was_ambiguous(int places) {
+  return absl::StrFormat(
+      "%d more %s: the scan shows the part, but not in which of several nearly alike poses; accept_ambiguous answers "
+      "such.",
+      places, places == 1 ? "place" : "places");
+}
+
 /// A sentence for a cloud that surrounds its sensor, as one does that was moved without it; empty for any other.
 std::string why_the_sensor_is_doubtful(const SensorView& view) {
   constexpr double kStray = 0.05;
@@ -89,16 +97,23 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     return described;
   };
   float best_doubtful = 0;
+  int ambiguous_places = 0;
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    const RankOptions options = {verification, params.min_score, params.presence_score, params.max_rejected,
-                                 [&](int m, const Eigen::Isometry3f& T_view_model) {
-                                   return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
-                                 }};
+    RankOptions options;
+    options.verification = verification;
+    options.min_score = params.min_score;
+    options.presence_score = params.presence_score;
+    options.accept_ambiguous = params.accept_ambiguous;
+    options.max_rejected = params.max_rejected;
+    options.allowed = [&](int m, const Eigen::Isometry3f& T_view_model) {
+      return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
+    };
     Ranking ranking = rank(finest, models, std::move(candidates), options, control);
     if (control.stop.stop_requested()) return control.status();
     candidates = std::move(ranking.accepted);
     best_doubtful = ranking.best_doubtful;
+    ambiguous_places = ranking.ambiguous_places;
     result.rejected = describe_all(ranking.rejected);
   }
   if (control.past_deadline()) stats.stop_reason = StopReason::kDeadline;
@@ -110,7 +125,11 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
     std::erase_if(candidate.occluded_by, [&](int i) { return i >= params.max_results; });
   }
   result.hypotheses = describe_all(candidates);
-  if (result.hypotheses.empty()) result.warnings.push_back(why_nothing_was_found(stats, best_doubtful, params));
+  if (ambiguous_places > 0) {
+    result.warnings.push_back(what_was_ambiguous(ambiguous_places));
+  } else if (result.hypotheses.empty()) {
+    result.warnings.push_back(why_nothing_was_found(stats, best_doubtful, params));
+  }
   stats.total_seconds = seconds_since(start);
   return result;
 }

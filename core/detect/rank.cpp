@@ -47,6 +47,15 @@ std::vector<Candidate> accept_present(CandidateLine& line, std::size_t model_cou
   }
 }
 
+/// Counts the places of parts that are surely there, but in a pose that has too many rivals.
+int count_ambiguous(CandidateLine line, const RankOptions& options) {
+  line.accept_rivals();
+  const std::vector<Candidate> more = line.accept(options.min_score, std::numeric_limits<std::size_t>::max());
+  return static_cast<int>(std::count_if(more.begin(), more.end(), [&](const Candidate& candidate) {
+    return !candidate.rivals.empty() && candidate.presence() >= static_cast<float>(options.presence_score);
+  }));
+}
+
 }  // namespace
 
 Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vector<Candidate> candidates,
@@ -58,6 +67,7 @@ Ranking rank(const DepthMap& map, std::span<const Model* const> models, std::vec
     Candidate& candidate = ranking.accepted[i];
     candidate.occluded_by = find_occluders(map, *models[candidate.model_index], candidate, i, line.owner());
   });
+  if (line.is_held_back_by_rivals(options.min_score)) ranking.ambiguous_places = count_ambiguous(line, options);
   line.take_back();
   constexpr double kAnything = 1e-6;  // a pose for which nothing speaks is none
   ranking.rejected = line.accept(kAnything, static_cast<std::size_t>(options.max_rejected));

@@ -20,11 +20,12 @@ struct Candidate {
   float votes = 0;
   Evidence evidence;
   float confidence = 1;                   ///< that the choice is right
+  bool accept_rivals = false;             ///< whether a rival would do as well
   std::vector<Eigen::Isometry3f> rivals;  ///< T_view_model of poses nearly alike from here, not ruled out
   std::vector<int> occluded_by;           ///< indices into the ranked list, ascending; set by rank()
 
-  /// The evidence, times the confidence that none of the rivals is the right one.
-  float score() const { return evidence.score() * confidence; }
+  /// The evidence, times the confidence that none of the rivals is the right one if that matters.
+  float score() const { return accept_rivals ? evidence.score() : evidence.score() * confidence; }
   /// How surely the part is there: the score, less where less shows of it than of the part on average. Edges alone are
   /// weak proof: the rim of a bin resembles many a part seen edge-on. Which of its poses is right does not matter to
   /// it.
@@ -37,14 +38,16 @@ struct Candidate {
 struct Ranking {
   std::vector<Candidate> accepted;  ///< those that score enough
   std::vector<Candidate> rejected;  ///< the best of the others, without `occluded_by`
+  int ambiguous_places = 0;         ///< where a part surely is that was not accepted because too many rivals are left
   float best_doubtful = 0;          ///< best presence() of the models that only the presence score kept out; 0 = none
 };
 
 /// How candidates are ranked.
 struct RankOptions {
   std::span<const VerifyOptions> verification = {};  ///< the final one of each model's candidates, by model index
-  double min_score = 0;       ///< candidates that score less, at first or for want of free pixels, are not accepted
-  double presence_score = 0;  ///< nor are those of a model of which none has at least this presence()
+  double min_score = 0;           ///< candidates that score less, at first or for want of free pixels, are not accepted
+  double presence_score = 0;      ///< nor are those of a model of which none has at least this presence()
+  bool accept_ambiguous = false;  ///< whether a candidate's score is its evidence, be its rivals as many as they may
   int max_rejected = 0;  ///< of those, so many are ranked on among themselves; what is accepted does not depend on it
   /// Whether a nearly alike pose of a candidate may be.
   std::function<bool(int model_index, const Eigen::Isometry3f& T_view_model)> allowed = [](int, const auto&) {

@@ -168,6 +168,8 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   std::optional<double> min_score, presence_score, share;
   app.add_option("--min-score", min_score);
   app.add_option("--presence-score", presence_score);
+  bool accept_ambiguous = false;
+  app.add_flag("--accept-ambiguous", accept_ambiguous);
   app.add_option("--pairs", train_params.pairs_per_point);
   app.add_option("--share", share);
   std::map<std::string, PairSelection> selections = {{"distinctiveness", PairSelection::kDistinctiveness},
@@ -197,6 +199,7 @@ int main(int argc, char** argv) {  // NOLINT(readability-function-size): one lin
   for (const std::string& step : left_out) steps().at(step)(train_params, detect_params);
   if (min_score) detect_params.min_score = *min_score;
   if (presence_score) detect_params.presence_score = *presence_score;
+  detect_params.accept_ambiguous = accept_ambiguous;
   if (share) detect_params.start_point_share = *share;
   if (cluster_limit) detect_params.cluster_limit = *cluster_limit;
 

@@ -191,7 +191,7 @@ TEST_F(Cli, DetectInMetresPrintsMillimetresToo) {
 TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   const Output output = run(
       "detect --model gear bolt --unit mm --max-results 5 --presence-score 0.2 --min-score 0 --start-point-share 0.5 "
-      "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --sensor 10 -20 1500 --scene",
+      "--max-rejected 7 --normal-tolerance 15 --keep-support-plane --accept-ambiguous --sensor 10 -20 1500 --scene",
       {file("a.pcd", "# a"), file("b.ply", "ply\nb")});
   EXPECT_EQ(output.exit_code, 0) << output.err;
   EXPECT_EQ(server_.stream_count(), 1);
@@ -212,6 +212,7 @@ TEST_F(Cli, DetectSendsEveryParameterAndAllScenesOverOneStream) {
   EXPECT_EQ(request.params().normal_tolerance_degrees(), 15);
   EXPECT_TRUE(request.params().has_remove_support_plane());
   EXPECT_FALSE(request.params().remove_support_plane());
+  EXPECT_TRUE(request.params().accept_ambiguous());
 }
 
 TEST_F(Cli, ADepthImageIsSeenFromItsCameraAlone) {

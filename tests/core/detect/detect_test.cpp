@@ -217,6 +217,31 @@ TEST(Detect, SaysThatNoPoseWasSureEnoughForThePartToBeThere) {
   EXPECT_EQ(search(cloud, model, params)->hypotheses.size(), present.hypotheses.size());
 }
 
+TEST(Detect, SaysHowManyPartsAreLeftOutAsAmbiguousAndAnswersThemWhenAsked) {
+  const Model model = testing::quick_model(testing::pinned_disc());
+  std::vector<testing::PlacedMesh> bodies;  // the pin away from the sensor
+  for (const double x : {-0.08, 0.0, 0.08}) {
+    bodies.push_back({testing::pinned_disc(), testing::pose(10 + 50 * x, Vector3d::UnitX(), {x, 0, 0.45})});
+  }
+  const PointCloud cloud = testing::render(bodies, testing::bin_sensor());
+  const DetectResult strict = *search(cloud, model);
+  EXPECT_TRUE(strict.hypotheses.empty());
+  ASSERT_EQ(strict.warnings.size(), 1U);
+  EXPECT_EQ(strict.warnings[0].find("3 more places"), 0U) << strict.warnings[0];
+  DetectParams params;
+  params.accept_ambiguous = true;
+  params.max_rejected=10;
+  const DetectResult lenient = *search(cloud, model, params);
+  for (auto& h: lenient.rejected) printf("DBG %.3f expl %.3f viol %.3f conf %.3f contr %.3f certain %.3f area %.2f res %.5f at %.3f %.3f %.3f\n", h.score,h.explained_fraction,h.violated_fraction,h.outline_confirmed,h.outline_contradicted,h.confidence,h.explained_area,h.residual,h.T_scene_model.translation().x(),h.T_scene_model.translation().y(),h.T_scene_model.translation().z());
+  EXPECT_TRUE(lenient.warnings.empty());
+  ASSERT_EQ(lenient.hypotheses.size(), 3U);
+  for (const PoseHypothesis& h : lenient.hypotheses) {
+    EXPECT_GT(h.score, 0.5);
+    EXPECT_LT(h.confidence, 0.3);
+    EXPECT_GE(h.variants.size(), 20U);
+  }
+}
+
 TEST(Detect, AnswersApartWhatScoredTooLittleAndChangesNothingElse) {
   const Model model = testing::quick_model(testing::l_block());
   const PointCloud cloud = testing::render(four_blocks(), testing::bin_sensor());

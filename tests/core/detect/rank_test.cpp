@@ -37,7 +37,8 @@ struct RankedScene {
   }
   Ranking rank_all(std::vector<Candidate> candidates, double min_score, int max_rejected) const {
     const Model* models[] = {&model};
-    return rank(map, models, std::move(candidates), {options, min_score, 0, max_rejected});
+    return rank(map, models, std::move(candidates),
+                {.verification = options, .min_score = min_score, .max_rejected = max_rejected});
   }
   std::vector<Candidate> ranked(std::vector<Candidate> candidates, double min_score) const {
     return rank_all(std::move(candidates), min_score, 0).accepted;
@@ -114,7 +115,8 @@ TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
   ASSERT_LT(doubtful.score(), between);
   const Model* models[] = {&scene.model};
   const auto rank_with = [&](const std::vector<Candidate>& candidates, double presence_score) {
-    return rank(scene.map, models, candidates, {scene.options, 0.1, presence_score, 5});
+    return rank(scene.map, models, candidates,
+                {.verification = scene.options, .min_score = 0.1, .presence_score = presence_score, .max_rejected = 5});
   };
   EXPECT_EQ(rank_with({doubtful, sure}, between).accepted.size(), 2U);
   EXPECT_EQ(rank_with({doubtful, sure}, between).best_doubtful, 0);
@@ -132,7 +134,9 @@ TEST(Rank, AsksEachPoseOfAPartThatIsNotSurelyThereForProof) {
   const Candidate weak = scene.candidate(shifted(scene.poses[1], 0.0015));
   const Model* models[] = {&scene.model};
   const auto accepted_with = [&](double presence_score) {
-    return rank(scene.map, models, {weak, better}, {scene.options, 0.1, presence_score, 0}).accepted;
+    return rank(scene.map, models, {weak, better},
+                {.verification = scene.options, .min_score = 0.1, .presence_score = presence_score})
+        .accepted;
   };
   ASSERT_LT(weak.presence(), 0.9F * better.presence());
   EXPECT_EQ(accepted_with(0.7 * better.presence()).size(), 2U);
@@ -179,9 +183,30 @@ TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
   const VerifyOptions options[] = {scene.options[0], scene.options[0]};
   const Model* models[] = {&scene.model, &scene.model};
   const double between = (sure.score() + doubtful.score()) / 2;
-  const Ranking ranking = rank(scene.map, models, {doubtful, sure}, {options, 0.1, between, 0});
+  const Ranking ranking =
+      rank(scene.map, models, {doubtful, sure}, {.verification = options, .min_score = 0.1, .presence_score = between});
   ASSERT_EQ(ranking.accepted.size(), 1U);
   EXPECT_EQ(ranking.accepted[0].model_index, 0);
+}
+
+TEST(Rank, CountsPartsWhoseMarkIsHiddenOrAcceptsThemWhereRivalsDoNotMatter) {
+  const RankedScene scene(testing::marked_hexagon(), testing::pose(5, Vector3d::UnitX(), {-0.05, 0, 0.4}),
+                          testing::pose(-4, Vector3d::UnitY(), {0.05, 0, 0.4}));
+  const std::vector<Candidate> candidates = {scene.candidate(scene.poses[0]), scene.candidate(scene.poses[1])};
+  const Model* models[] = {&scene.model};
+  RankOptions options = {.verification = scene.options, .min_score = 0.4, .presence_score = 0.4};
+  const Ranking strict = rank(scene.map, models, candidates, options);
+  EXPECT_TRUE(strict.accepted.empty());
+  EXPECT_EQ(strict.ambiguous_places, 2);
+  options.accept_ambiguous = true;
+  const Ranking lenient = rank(scene.map, models, candidates, options);
+  EXPECT_EQ(lenient.ambiguous_places, 0);
+  ASSERT_EQ(lenient.accepted.size(), 2U);
+  for (const Candidate& candidate : lenient.accepted) {
+    EXPECT_EQ(candidate.score(), candidate.evidence.score());
+    EXPECT_LT(candidate.confidence, 0.3F);
+    EXPECT_GE(candidate.rivals.size(), 5U);
+  }
 }
 
 TEST(Rank, IsTheSameOnAnyNumberOfThreads) {
@@ -193,7 +218,7 @@ TEST(Rank, IsTheSameOnAnyNumberOfThreads) {
     candidates.push_back(scene.candidate(Eigen::Translation3d(shift) * scene.poses[i % 2]));
   }
   const Model* models[] = {&scene.model};
-  const RankOptions options = {scene.options, 0.1, 0, 20};
+  const RankOptions options = {.verification = scene.options, .min_score = 0.1, .max_rejected = 20};
   const Ranking one = rank(scene.map, models, candidates, options);
   ASSERT_GE(one.accepted.size(), 2U);
   ASSERT_GE(one.rejected.size(), 1U);
