@@ -61,7 +61,7 @@ struct DetectParams {
   /// What one pose of a model must reach for any of its poses to count, [0, 1]: its score, whatever its rivals, times
   /// its explained area where that is below 1, and less in a coarse scan that does not confirm its outline. A bin that
   /// holds a part nearly always shows one of them well; where all poses are doubtful, the part is not there, and where
-  /// none reaches a tenth more, only those count that reach it themselves.
+  /// none reaches a seventh more, only those count that reach it themselves.
   double presence_score = 0.45;
   /// Whether a pose counts, and is scored, by how surely the part is there in it or in one of its variants. If not, a
   /// score is the less the more of those the scene leaves: few of a bin of discs reach min_score whose mark is hidden.

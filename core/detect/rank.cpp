@@ -13,7 +13,7 @@ namespace {
 
 /// A part is surely there, so that other poses of it need no proof, if one pose's lenient presence is so many times
 /// what is asked for.
-constexpr float kSure = 1.1F;
+constexpr float kSure = 1.15F;
 
 /// The best of each model's candidates by a merit, -1 where there are none.
 std::vector<float> best_by_model(float (Candidate::*merit)() const, std::span<const Candidate> candidates,

@@ -10,12 +10,12 @@ namespace binpose {
 namespace {
 
 // See Evidence::score().
-constexpr float kViolationPenalty = 3;
+constexpr float kViolationPenalty = 4;
 constexpr float kExcuse = 0.75F;
 constexpr float kMisfitPenalty = 0.75F;
 constexpr float kLargeArea = 0.75F;
 constexpr float kSizeExponent = 0.45F;
-constexpr float kOutlinePenalty = 1.8F;
+constexpr float kOutlinePenalty = 1.5F;
 /// Residual that is no misfit however little the noise, diameters: what the model's sampling leaves, and what a real
 /// scanner's calibration bends, which no window of neighbouring pixels shows as noise.
 constexpr float kRelativeFloor = 0.002F;

@@ -36,8 +36,8 @@ struct Evidence {
   /// explains, or where so little of it is seen that chance may have made it. The weights were fitted on which poses of
   /// simulated bins are right.
   float score() const { return score_with_outline(outline_weight); }
-  /// The same as if the pixels were fine: in doubt, a surface without the outline is no proof.
-  float strict_score() const { return score_with_outline(1); }
+  /// The same with coarse pixels excused but in part: in doubt, a surface without the outline is weak proof.
+  float strict_score() const { return score_with_outline((2 + outline_weight) / 3); }
   /// Ranks poses that are not refined yet. So far off, most of them contradict the scene enough that their score is 0;
   /// this goes on telling them apart.
   float promise() const;

@@ -213,7 +213,7 @@ TEST(Detect, SaysThatNoPoseWasSureEnoughForThePartToBeThere) {
   EXPECT_NE(result.warnings[0].find("less than presence_score"), std::string::npos);
   params.presence_score = 0.999 * best;
   EXPECT_GE(search(cloud, model, params)->hypotheses.size(), 1U);
-  params.presence_score = 0.9 * best;  // so that no other pose has to prove it
+  params.presence_score = 0.85 * best;  // so that no other pose has to prove it
   EXPECT_EQ(search(cloud, model, params)->hypotheses.size(), present.hypotheses.size());
 }
 
@@ -230,9 +230,7 @@ TEST(Detect, SaysHowManyPartsAreLeftOutAsAmbiguousAndAnswersThemWhenAsked) {
   EXPECT_EQ(strict.warnings[0].find("3 more places"), 0U) << strict.warnings[0];
   DetectParams params;
   params.accept_ambiguous = true;
-  params.max_rejected=10;
   const DetectResult lenient = *search(cloud, model, params);
-  for (auto& h: lenient.rejected) printf("DBG %.3f expl %.3f viol %.3f conf %.3f contr %.3f certain %.3f area %.2f res %.5f at %.3f %.3f %.3f\n", h.score,h.explained_fraction,h.violated_fraction,h.outline_confirmed,h.outline_contradicted,h.confidence,h.explained_area,h.residual,h.T_scene_model.translation().x(),h.T_scene_model.translation().y(),h.T_scene_model.translation().z());
   EXPECT_TRUE(lenient.warnings.empty());
   ASSERT_EQ(lenient.hypotheses.size(), 3U);
   for (const PoseHypothesis& h : lenient.hypotheses) {

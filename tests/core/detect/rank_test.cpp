@@ -109,7 +109,7 @@ TEST(Rank, KeepsApartTheBestOfThoseThatScoreTooLittle) {
 
 TEST(Rank, BelievesDoubtfulPosesOnlyBesideASureOne) {
   const RankedScene scene = blocks();
-  const Candidate sure = scene.candidate(scene.poses[0]), doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
+  const Candidate sure = scene.candidate(scene.poses[0]), doubtful = scene.candidate(shifted(scene.poses[1], 0.0018));
   ASSERT_LT(doubtful.score(), sure.score());
   const double between = 0.7 * sure.score();
   ASSERT_LT(doubtful.score(), between);
@@ -156,7 +156,7 @@ TEST(Rank, TakesAPoseOfWhichLittleShowsForWeakProof) {
 
 TEST(Rank, GivesBackWhatAnAbsentModelTook) {
   const RankedScene scene = blocks();
-  Candidate first = scene.candidate(scene.poses[0]), second = scene.candidate(shifted(scene.poses[0], 0.0001));
+  Candidate first = scene.candidate(scene.poses[0]), second = scene.candidate(shifted(scene.poses[0], 0.0005));
   // As if the one's model showed much more on average, so that this pose proves it less.
   Model absent = scene.model, present = scene.model;
   for (float& area : absent.view_area) area *= 0.8F / first.evidence.area;
@@ -167,8 +167,9 @@ TEST(Rank, GivesBackWhatAnAbsentModelTook) {
   const std::vector<Candidate> both = {first, second};
   const double presence_score = 0.99 * second.score();
   ASSERT_LT(0.8F * first.score(), presence_score);
-  EXPECT_EQ(rank(scene.map, models, both, {options, 0.1, 0, 0}).accepted.at(0).model_index, 0);
-  const Ranking ranking = rank(scene.map, models, both, {options, 0.1, presence_score, 0});
+  EXPECT_EQ(rank(scene.map, models, both, {.verification = options, .min_score = 0.1}).accepted.at(0).model_index, 0);
+  const Ranking ranking =
+      rank(scene.map, models, both, {.verification = options, .min_score = 0.1, .presence_score = presence_score});
   ASSERT_EQ(ranking.accepted.size(), 1U);
   EXPECT_EQ(ranking.accepted[0].model_index, 1);
   EXPECT_GE(ranking.accepted[0].score(), 0.99F * second.score());
@@ -178,7 +179,7 @@ TEST(Rank, GivesBackWhatAnAbsentModelTook) {
 TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
   const RankedScene scene = blocks();
   const Candidate sure = scene.candidate(scene.poses[0]);
-  Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
+  Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0018));
   doubtful.model_index = 1;
   const VerifyOptions options[] = {scene.options[0], scene.options[0]};
   const Model* models[] = {&scene.model, &scene.model};
