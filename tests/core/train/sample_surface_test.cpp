@@ -92,15 +92,15 @@ TEST(Scatter, LeavesNoGapsInAFanOfSlivers) {
     fan.vertices.emplace_back(kRadius * std::cos(angle), kRadius * std::sin(angle), 0);
     fan.triangles.push_back({0, 1U + i, 1U + (i + 1) % kSlivers});
   }
-  constexpr int kCells = 70;  // of three spacings, over the disc's box and beyond
+  constexpr int kHalf = 35, kCells = 2 * kHalf;  // of three spacings, over the disc's box and beyond
   std::vector<int> count(kCells * kCells);
-  const auto cell_of = [](float x) { return static_cast<int>(std::floor(x / (3 * kSpacing))) + kCells / 2; };
+  const auto cell_of = [](float x) { return static_cast<int>(std::floor(x / (3 * kSpacing))) + kHalf; };
   for (const SurfacePoint& p : scatter(fan, kSpacing)) {
     ++count[cell_of(p.position.y()) * kCells + cell_of(p.position.x())];
   }
   for (int row = 0; row < kCells; ++row) {
     for (int column = 0; column < kCells; ++column) {
-      const Eigen::Vector2f middle(column - kCells / 2 + 0.5F, row - kCells / 2 + 0.5F);
+      const Eigen::Vector2f middle = Eigen::Vector2i(column - kHalf, row - kHalf).cast<float>().array() + 0.5F;
       if (static_cast<float>(3 * kSpacing) * (middle.norm() + 1) > kRadius) continue;  // not wholly inside
       EXPECT_GE(count[row * kCells + column], 3) << middle.transpose();
       EXPECT_LE(count[row * kCells + column], 17) << middle.transpose();
