@@ -100,15 +100,14 @@ absl::StatusOr<DetectResult> detect(const PointCloud& cloud, std::span<const Mod
   int ambiguous_places = 0;
   if (params.verification == Verification::kVisibleSurface) {
     const StageTimer timer(stats.rank_seconds);
-    RankOptions options;
-    options.verification = verification;
-    options.min_score = params.min_score;
-    options.presence_score = params.presence_score;
-    options.accept_ambiguous = params.accept_ambiguous;
-    options.max_rejected = params.max_rejected;
-    options.allowed = [&](int m, const Eigen::Isometry3f& T_view_model) {
-      return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
-    };
+    const RankOptions options = {.verification = verification,
+                                 .min_score = params.min_score,
+                                 .presence_score = params.presence_score,
+                                 .accept_ambiguous = params.accept_ambiguous,
+                                 .max_rejected = params.max_rejected,
+                                 .allowed = [&](int m, const Eigen::Isometry3f& T_view_model) {
+                                   return is_allowed(finest, *models[m], m, params.space, {}, T_view_model);
+                                 }};
     Ranking ranking = rank(finest, models, std::move(candidates), options, control);
     if (control.stop.stop_requested()) return control.status();
     candidates = std::move(ranking.accepted);

@@ -46,10 +46,11 @@ VariantChoice choose_variant(const DepthMap& map, const Model& model, const Eige
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const float likelihood = likelihood_ratio(evidence[i] - *best, spacing);
     odds += likelihood;
-    if (likelihood > kRuledOut && !same_pose(model, poses[i], choice.T_view_model)) {
-      choice.rivals.push_back(poses[i]);
-    } else if (likelihood > kRuledOut) {
+    if (likelihood <= kRuledOut) continue;
+    if (same_pose(model, poses[i], choice.T_view_model)) {
       right += likelihood;
+    } else {
+      choice.rivals.push_back(poses[i]);
     }
   }
   choice.confidence = right / odds;

@@ -61,6 +61,7 @@ Eigen::Vector3f point_in(const Triangle& t, std::size_t serial) {
 std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunControl& control,
                                   std::vector<std::uint32_t>* triangle_of) {
   std::vector<SurfacePoint> points;
+  const double area_per_point = spacing * spacing;
   double owed = 0.5;  // area not yet turned into points, in units of one point
   std::uint64_t piece_count = 0;
   std::vector<Triangle> pieces;
@@ -75,15 +76,16 @@ std::vector<SurfacePoint> scatter(const Mesh& mesh, double spacing, const RunCon
       if (control.interrupted_at(piece_count++)) return points;
       const Triangle piece = pieces.back();
       pieces.pop_back();
-      const auto [first, second] = halves(piece);
       const double size = area_of(piece);
-      const bool can_be_cut = std::max(area_of(first), area_of(second)) < size;  // coordinates have few digits
-      if (size > spacing * spacing && can_be_cut) {
-        pieces.push_back(second);
-        pieces.push_back(first);
-        continue;
+      if (size > area_per_point) {
+        const auto [first, second] = halves(piece);
+        if (std::max(area_of(first), area_of(second)) < size) {  // else the coordinates have too few digits to cut it
+          pieces.push_back(second);
+          pieces.push_back(first);
+          continue;
+        }
       }
-      for (owed += size / (spacing * spacing); owed >= 1; owed -= 1) {
+      for (owed += size / area_per_point; owed >= 1; owed -= 1) {
         points.push_back({point_in(piece, points.size()), normal});
         if (triangle_of) triangle_of->push_back(index);
       }

@@ -65,41 +65,30 @@ std::optional<Axis> find_axis(const TurnSearch& search, std::span<const RatedTur
   return std::nullopt;
 }
 
-/// Gathers turns, those left out that show what another does.
-class Likes {
- public:
-  Likes(const TurnSearch& search, SelfSimilarity& found) : search_(search), found_(found) {}
-
-  void add(const Eigen::Isometry3f& T, std::vector<Pose>& list) {
-    const bool is_known = std::any_of(symmetry().discrete.begin(), symmetry().discrete.end(), [&](const Pose& S) {
-      return same(S.cast<float>(), T) ||
-             std::any_of(found_.similar.begin(), found_.similar.end(),
-                         [&](const Pose& like) { return same(like.cast<float>() * S.cast<float>(), T); });
-    });
-    if (!is_known) list.push_back(T.cast<double>());
-  }
-
- private:
-  const Symmetry& symmetry() const { return found_.symmetry; }
-
-  bool same(const Eigen::Isometry3f& a, const Eigen::Isometry3f& b) const {
-    return symmetry().has_axis ? same_axis(a, b, symmetry(), search_.radius(), search_.same_pose())
-                               : same_turn(a, b, search_.radius(), search_.same_pose());
-  }
-
-  const TurnSearch& search_;
-  SelfSimilarity& found_;
-};
+/// Whether a turn shows what one of those found does.
+bool is_known(const TurnSearch& search, const SelfSimilarity& found, const Eigen::Isometry3f& T) {
+  const Symmetry& symmetry = found.symmetry;
+  const auto same = [&](const Eigen::Isometry3f& other) {
+    return symmetry.has_axis ? same_axis(other, T, symmetry, search.radius(), search.same_pose())
+                             : same_turn(other, T, search.radius(), search.same_pose());
+  };
+  return std::any_of(symmetry.discrete.begin(), symmetry.discrete.end(), [&](const Pose& S) {
+    return same(S.cast<float>()) || std::any_of(found.similar.begin(), found.similar.end(), [&](const Pose& like) {
+             return same(like.cast<float>() * S.cast<float>());
+           });
+  });
+}
 
 /// Instead of a few turns about an axis, on which the part hardly depends, and of others: even steps about it, by
 /// themselves and before each of the others.
-void spread_about(const Axis& axis, Likes& likes, std::vector<Pose>& similar) {
+void spread_about(const Axis& axis, const TurnSearch& search, SelfSimilarity& found) {
   std::vector<Pose> bases = {Pose::Identity()};
-  bases.insert(bases.end(), similar.begin(), similar.end());
-  similar.clear();
+  bases.insert(bases.end(), found.similar.begin(), found.similar.end());
+  found.similar.clear();
   for (const Pose& base : bases) {
-    for (int i = 0; i < kTurnsAboutAxis && similar.size() < kMostSimilar; ++i) {
-      likes.add(base.cast<float>() * axis.turn(2 * std::numbers::pi * i / kTurnsAboutAxis), similar);
+    for (int i = 0; i < kTurnsAboutAxis && found.similar.size() < kMostSimilar; ++i) {
+      const Eigen::Isometry3f T = base.cast<float>() * axis.turn(2 * std::numbers::pi * i / kTurnsAboutAxis);
+      if (!is_known(search, found, T)) found.similar.push_back(T.cast<double>());
     }
   }
 }
@@ -118,14 +107,14 @@ SelfSimilarity find_self_similarity(const std::vector<SurfacePoint>& dense, cons
     symmetry.axis_direction = axis->direction.cast<double>();
     symmetry.axis_point = axis->point.cast<double>();
   }
-  Likes likes(search, result);
   // Best first: all that is symmetry comes before what is only similar.
   for (const RatedTurn& turn : turns) {
-    likes.add(turn.T, turn.share >= kSameShare ? symmetry.discrete : result.similar);
+    if (is_known(search, result, turn.T)) continue;
+    (turn.share >= kSameShare ? symmetry.discrete : result.similar).push_back(turn.T.cast<double>());
   }
   if (symmetry.has_axis) return result;
   const std::optional<Axis> axis = find_axis(search, turns, kSimilarShare, control);
-  if (axis) spread_about(*axis, likes, result.similar);
+  if (axis) spread_about(*axis, search, result);
   return result;
 }
 

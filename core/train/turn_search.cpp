@@ -21,17 +21,6 @@ constexpr std::size_t kGlancedPoints = 400;  // a first judgement
 constexpr float kFlank = 0.45F;  // radians, about 26 degrees, within which a turn may lie on another's flank
 constexpr double kDip = 0.002;   // of the share, between two peaks
 
-/// Share of the points that a turn leaves on the surface.
-double share_on_surface(const CellIndex& index, const std::vector<SurfacePoint>& points, const Eigen::Isometry3f& T,
-                        std::size_t most, float tolerance, const RunControl& control) {
-  const std::size_t count = std::min(most, points.size());
-  std::size_t on = 0;
-  for (std::size_t i = 0; i < count && !control.interrupted_at(i); ++i) {
-    on += index.near({T * points[i].position, T.linear() * points[i].normal}, tolerance);
-  }
-  return static_cast<double>(on) / static_cast<double>(count);
-}
-
 /// Half of the way from one turn to another.
 Eigen::Isometry3f halfway(const Eigen::Isometry3f& a, const Eigen::Isometry3f& b, const Eigen::Vector3f& middle) {
   Eigen::Isometry3f T = Eigen::Isometry3f::Identity();
@@ -87,7 +76,12 @@ float TurnSearch::first_gate() const { return static_cast<float>(kFirstGate) * d
 float TurnSearch::second_gate() const { return static_cast<float>(kSecondGate) * diameter_; }
 
 double TurnSearch::share(const Eigen::Isometry3f& T, std::size_t most) const {
-  return share_on_surface(finely_by_place_, surface_, T, most, on_surface_, control_);
+  const std::size_t count = std::min(most, surface_.size());
+  std::size_t on = 0;
+  for (std::size_t i = 0; i < count && !control_.interrupted_at(i); ++i) {
+    on += finely_by_place_.near({T * surface_[i].position, T.linear() * surface_[i].normal}, on_surface_);
+  }
+  return static_cast<double>(on) / static_cast<double>(count);
 }
 
 Eigen::Isometry3f TurnSearch::settle(const CellIndex& index, const std::vector<SurfacePoint>& target, std::size_t most,

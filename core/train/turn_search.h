@@ -57,6 +57,7 @@ class TurnSearch {
   /// angles on the surface, to within the tolerance, and what was found lies anywhere in it.
   std::vector<RatedTurn> polished(std::vector<RatedTurn> turns) const;
 
+  /// Appends a turn that leaves enough of the surface on itself, unless it is known.
   void add(const Eigen::Isometry3f& T, std::vector<RatedTurn>& found) const;
 
   /// Leaves out turns on the flank of a better one: halfway to it the part fits no worse.

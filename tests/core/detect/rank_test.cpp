@@ -179,7 +179,7 @@ TEST(Rank, GivesBackWhatAnAbsentModelTook) {
 TEST(Rank, AsksEachModelForASureOneOfItsOwn) {
   const RankedScene scene = blocks();
   const Candidate sure = scene.candidate(scene.poses[0]);
-  Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0018));
+  Candidate doubtful = scene.candidate(shifted(scene.poses[1], 0.0015));
   doubtful.model_index = 1;
   const VerifyOptions options[] = {scene.options[0], scene.options[0]};
   const Model* models[] = {&scene.model, &scene.model};

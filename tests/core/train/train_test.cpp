@@ -119,7 +119,7 @@ TEST(Train, WarnsOfWhatIsWrongWithTheMesh) {
               ::testing::ElementsAre(::testing::HasSubstr("inside out")));
   const Mesh crate = testing::box({0.1F, 0.1F, 0.1F});
   EXPECT_THAT(train(testing::joined(crate, testing::box({0.05F, 0.05F, 0.05F})), quick(), {})->warnings,
-              ::testing::ElementsAre(::testing::ContainsRegex("^2[01] % of the mesh's surface can't be seen")));
+              ::testing::ElementsAre(::testing::HasSubstr("21 % of the mesh's surface can't be seen")));
 }
 
 TEST(Train, IsBitIdenticalOnAnyNumberOfThreadsAndOnRepetition) {
