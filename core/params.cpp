@@ -75,7 +75,6 @@ DetectParams DetectParams::fast() {
   DetectParams params;
   params.start_point_share = 0.06;
   params.cluster_limit = 240;
-  params.clusters_per_place = 6;
   params.refine_limit = 80;
   params.refined_per_place = 2;
   params.finalist_limit = 50;
@@ -87,7 +86,6 @@ DetectParams DetectParams::thorough() {
   DetectParams params;
   params.start_point_share = 1;
   params.cluster_limit = 4000;
-  params.clusters_per_place = 60;
   params.least_promise = 0;
   params.refine_limit = 1200;
   params.refined_per_place = 24;
@@ -117,7 +115,6 @@ absl::Status validate(const DetectParams& params) {
       in_range("max_results", params.max_results, 1, 1000),
       in_range("max_rejected", params.max_rejected, 0, 1000),
       in_range("cluster_limit", params.cluster_limit, 1, 100000),
-      in_range("clusters_per_place", params.clusters_per_place, 1, 1000),
       in_range("least_promise", params.least_promise, -2, 2),
       in_range("refine_limit", params.refine_limit, 1, 100000),
       in_range("refined_per_place", params.refined_per_place, 1, 1000),

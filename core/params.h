@@ -63,8 +63,8 @@ struct DetectParams {
   /// holds a part nearly always shows one of them well; where all poses are doubtful, the part is not there, and where
   /// none reaches a seventh more, only those count that reach it themselves.
   double presence_score = 0.45;
-  /// Whether a pose counts, and is scored, by how surely the part is there in it or in one of its variants. If not, a
-  /// score is the less the more of those the scene leaves: few of a bin of discs reach min_score whose mark is hidden.
+  /// Whether poses are answered whose variants the scene does not rule out, as of a disc whose mark is hidden. A score
+  /// then says how surely the part is there in this pose or a variant of it; else, how surely it is in this very pose.
   bool accept_ambiguous = false;
   int max_results = 100;  ///< [1, 1000]
   int max_rejected = 0;   ///< best poses that scored too little, answered apart, [0, 1000]
@@ -80,7 +80,6 @@ struct DetectParams {
 
   // Effort.
   int cluster_limit = 700;      ///< clusters of votes that are verified, most votes first, per source, [1, 100000]
-  int clusters_per_place = 20;  ///< of those at most so many within a neighbourhood, [1, 1000]
   double least_promise = 0.5;   ///< Evidence::promise() of a pose that is refined, [-2, 2]
   int refine_limit = 200;       ///< poses that are refined, per source, [1, 100000]
   int refined_per_place = 5;    ///< [1, 1000]

@@ -81,7 +81,7 @@ int report(const absl::Status& status) {
 int main(int argc, char** argv) {
   keep_memory_of_scans();
   binpose::server::Config config;
-  CLI::App app("Trains models of parts and finds them in point clouds; serves binpose.v1 over gRPC.");
+  CLI::App app("Trains models of parts and finds them in point clouds; serves binpose.v1 over gRPC.", "binpose-server");
   binpose::server::add_options(app, config);
   Action action = Action::kServe;
   add_actions(app, action);

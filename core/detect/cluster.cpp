@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/detect/thin_clusters.h"
+#include "core/detect/distinct_clusters.h"
 #include "core/parallel.h"
 
 namespace binpose {
@@ -232,7 +232,7 @@ std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterO
   std::stable_sort(merged.begin(), merged.end(),
                    [](const PoseCluster& a, const PoseCluster& b) { return a.votes > b.votes; });
 
-  return thin_clusters(merged, options);
+  return distinct_clusters(merged, options);
 }
 
 }  // namespace binpose

@@ -18,18 +18,15 @@ struct PoseCluster {
 
 /// How clusters are told apart and thinned.
 struct ClusterOptions {
-  float radius = 0;         ///< votes and clusters nearer than this, metres ...
-  float angle = 0.35F;      ///< ... and this, radians, are the same pose
-  float neighbourhood = 0;  ///< metres within which clusters compete
-  int most_per_neighbourhood = 0;
+  float radius = 0;     ///< votes and clusters nearer than this, metres ...
+  float angle = 0.35F;  ///< ... and this, radians, are the same pose
   int most = 0;
 };
 
 /// Clusters of whole poses, most votes first [paper, section IV 4].
 ///
 /// Votes are binned by centre and rotation; the bins of most votes are merged with their neighbours, averaged, and kept
-/// unless they repeat a stronger one or `most_per_neighbourhood` stronger ones lie around. Deterministic. Empty when
-/// stopped.
+/// unless they repeat a stronger one. Deterministic. Empty when stopped.
 std::vector<PoseCluster> cluster(std::span<const PoseVote> votes, const ClusterOptions& options,
                                  const RunControl& control = {});
 

@@ -85,8 +85,6 @@ std::vector<Candidate> cluster_votes(std::vector<PoseVote> votes, const DepthMap
   keep_votes_in_regions(map, params.space, voted.distance, votes);
   ClusterOptions options;
   options.radius = kClusterRadius * diameter;
-  options.neighbourhood = kNeighbourhood * diameter;
-  options.most_per_neighbourhood = params.clusters_per_place;
   options.most = params.cluster_limit;
   std::vector<Candidate> candidates;
   for (const PoseCluster& c : cluster(votes, options, control)) {

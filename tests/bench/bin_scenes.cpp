@@ -132,7 +132,6 @@ const std::map<std::string, Step>& steps() {
       {"normal-gate", [](TrainParams&, DetectParams& detect) { detect.normal_tolerance = 180 * kDegree; }},
       {"plane-removal", [](TrainParams&, DetectParams& detect) { detect.remove_support_plane = false; }},
       {"promise", [](TrainParams&, DetectParams& detect) { detect.least_promise = -2; }},
-      {"places", [](TrainParams&, DetectParams& detect) { detect.clusters_per_place = detect.cluster_limit; }},
       {"refinement", [](TrainParams&, DetectParams& detect) { detect.refine = false; }},
       {"presence", [](TrainParams&, DetectParams& detect) { detect.presence_score = 0; }},
       {"signal-to-noise", [](TrainParams& train, DetectParams&) { train.selection = PairSelection::kIntegration; }},

@@ -109,10 +109,7 @@ void vote_by_contour(State& state, const Bench& bench) {
 
 void cluster_votes(State& state, const Bench& bench) {
   const auto diameter = static_cast<float>(bench.model.diameter);
-  const ClusterOptions options = {.radius = 0.06F * diameter,
-                                  .neighbourhood = 0.25F * diameter,
-                                  .most_per_neighbourhood = bench.params.clusters_per_place,
-                                  .most = bench.params.cluster_limit};
+  const ClusterOptions options = {.radius = 0.06F * diameter, .most = bench.params.cluster_limit};
   for (auto _ : state) benchmark::DoNotOptimize(cluster(bench.votes.votes, options));
   count(state, "votes", bench.votes.votes.size());
 }

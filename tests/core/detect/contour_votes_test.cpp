@@ -31,8 +31,6 @@ TEST(ContourVotes, FindAPartOfWhichOnlyAFlatSideShows) {
   EXPECT_GT(votes.scene_pairs, 100u);
   ClusterOptions options;
   options.radius = static_cast<float>(0.06 * scene.model.diameter);
-  options.neighbourhood = static_cast<float>(0.25 * scene.model.diameter);
-  options.most_per_neighbourhood = 20;
   options.most = 100;
   const Eigen::Isometry3f truth = testing::in_view(scene.map, scene.T_scene_model);
   const std::vector<PoseCluster> clusters = cluster(votes.votes, options);

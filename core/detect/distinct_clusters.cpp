@@ -1,4 +1,4 @@
-#include "core/detect/thin_clusters.h"
+#include "core/detect/distinct_clusters.h"
 
 #include <array>
 
@@ -10,15 +10,16 @@ class ClusterGrid {
  public:
   explicit ClusterGrid(float side) : inverse_(1 / side) { last_.fill(-1); }
 
-  /// Calls `use(i)` for each cluster within a cell's side of a place, and some others, while it returns true.
-  template <typename Use>
-  void for_each_around(const Eigen::Vector3f& place, Use&& use) const {
+  /// Whether `holds(i)` for a cluster within a cell's side of a place; some others are asked about, too.
+  template <typename Predicate>
+  bool any_around(const Eigen::Vector3f& place, Predicate&& holds) const {
     const Eigen::Array2i c = cell(place);
     for (int k = 0; k < 9; ++k) {
       for (int i = last_[list(c.x() + k % 3 - 1, c.y() + k / 3 - 1)]; i >= 0; i = before_[i]) {
-        if (!use(i)) return;
+        if (holds(i)) return true;
       }
     }
+    return false;
   }
   /// The next cluster, counted from 0.
   void insert(const Eigen::Vector3f& place) {
@@ -42,22 +43,14 @@ class ClusterGrid {
 
 }  // namespace
 
-std::vector<PoseCluster> thin_clusters(const std::vector<PoseCluster>& clusters, const ClusterOptions& options) {
+std::vector<PoseCluster> distinct_clusters(const std::vector<PoseCluster>& clusters, const ClusterOptions& options) {
   const SamePose same_pose(options);
   std::vector<PoseCluster> kept;
-  ClusterGrid grid(options.neighbourhood);
+  ClusterGrid grid(options.radius);
   for (const PoseCluster& candidate : clusters) {
     if (static_cast<int>(kept.size()) >= options.most) break;
-    int around = 0;
-    bool repeats = false;
-    grid.for_each_around(candidate.centre, [&](int i) {
-      const PoseCluster& other = kept[i];
-      if ((other.centre - candidate.centre).squaredNorm() > options.neighbourhood * options.neighbourhood) return true;
-      ++around;
-      repeats = same_pose(other, candidate);
-      return !repeats && around < options.most_per_neighbourhood;
-    });
-    if (repeats || around >= options.most_per_neighbourhood) continue;
+    const bool repeats = grid.any_around(candidate.centre, [&](int i) { return same_pose(kept[i], candidate); });
+    if (repeats) continue;
     grid.insert(candidate.centre);
     kept.push_back(candidate);
   }

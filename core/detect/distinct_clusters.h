@@ -22,8 +22,7 @@ class SamePose {
   float sq_radius_, half_angle_cosine_;
 };
 
-/// The strongest clusters of a list that has them first, without those that repeat a stronger one or have too many of
-/// them around.
-std::vector<PoseCluster> thin_clusters(const std::vector<PoseCluster>& clusters, const ClusterOptions& options);
+/// The strongest clusters of a list that has them first, without those that repeat a stronger one.
+std::vector<PoseCluster> distinct_clusters(const std::vector<PoseCluster>& clusters, const ClusterOptions& options);
 
 }  // namespace binpose
