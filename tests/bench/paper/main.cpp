@@ -25,11 +25,13 @@ int main(int argc, char** argv) {
     command->add_option("scenes", scenes, "folder of scene folders")->required()->check(CLI::ExistingDirectory);
     command->add_option("output", output)->required();
   };
-  CLI::App* table = add("table", "Table I", [&] { run_table(parts, scenes, output, share); });
-  with_scenes(table);
-  table->add_option("--shares", share.count, "so many processes share the scenes")->check(CLI::Range(1, 100));
-  table->add_option("--share", share.index, "the one of these that is this process's, from 0 on");
-  with_scenes(add("sweep", "Fig. 8 and 9", [&] { run_sweep(parts, scenes, output); }));
+  const auto with_share_of_scenes = [&](CLI::App* command) {
+    with_scenes(command);
+    command->add_option("--shares", share.count, "so many processes share the scenes")->check(CLI::Range(1, 100));
+    command->add_option("--share", share.index, "the one of these that is this process's, from 0 on");
+  };
+  with_share_of_scenes(add("table", "Table I", [&] { run_table(parts, scenes, output, share); }));
+  with_share_of_scenes(add("sweep", "Fig. 8 and 9", [&] { run_sweep(parts, scenes, output, share); }));
   with_scenes(add("pictures", "what Fig. 3, 6 and 7 show", [&] { write_pictures(parts, scenes, output); }));
   CLI::App* accuracy = add("accuracy", "Fig. 5", [&] { run_accuracy(parts, count, output); });
   accuracy->add_option("output", output)->required();

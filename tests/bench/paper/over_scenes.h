@@ -20,6 +20,6 @@ std::vector<std::filesystem::path> scene_folders(const std::filesystem::path& sc
 /// yet. A line of the log: "key" (the scene), "part", and "results" with the measurements of each finder.
 void measure_over_scenes(const std::string& run, const std::filesystem::path& parts,
                          const std::filesystem::path& scenes, const std::filesystem::path& output,
-                         const std::function<NamedFinders(const testing::ScenePart&)>& train, Share share = {});
+                         const std::function<NamedFinders(const testing::ScenePart&)>& train, Share share);
 
 }  // namespace binpose::paper

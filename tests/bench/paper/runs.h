@@ -17,9 +17,9 @@ void run_table(const std::filesystem::path& parts, const std::filesystem::path& 
                const std::filesystem::path& output, Share share);
 
 /// Fig. 8 and 9: the paper's preset over the number of vector pairs and over the weights of [Eq. 7]; and the preset as
-/// the paper has it, without refinement.
+/// the paper has it, without refinement. On every scene of the share, one thread.
 void run_sweep(const std::filesystem::path& parts, const std::filesystem::path& scenes,
-               const std::filesystem::path& output);
+               const std::filesystem::path& output, Share share);
 
 /// Fig. 5: part A moved at random, `count` times.
 void run_accuracy(const std::filesystem::path& parts, int count, const std::filesystem::path& output);

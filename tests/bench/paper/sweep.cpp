@@ -55,8 +55,8 @@ NamedFinders train_all(const testing::ScenePart& part) {
 }  // namespace
 
 void run_sweep(const std::filesystem::path& parts, const std::filesystem::path& scenes,
-               const std::filesystem::path& output) {
-  measure_over_scenes("sweep", parts, scenes, output, train_all);
+               const std::filesystem::path& output, Share share) {
+  measure_over_scenes("sweep", parts, scenes, output, train_all, share);
 }
 
 }  // namespace binpose::paper
